@@ -42,7 +42,7 @@ LISTS = {
 }
 # Folders and files that are not searched: build results, and files that contain these words as data.
 ELSEWHERE = {"build", ".git", ".venv", "__pycache__"}
-THEMSELVES = {"scripts/deviations.py", "test/gates/test_planted_faults.py"}
+THEMSELVES = {"scripts/deviations.py", "test/gates/test_seeded_faults.py"}
 WORDS = {".md", ".scd", ".svg", ".json.gz"}
 
 

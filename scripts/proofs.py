@@ -44,7 +44,7 @@ COUNTED = {
     "kernel.verdicts": ("tests of the kernel's runner", "test/kernel/test_*.py", r"^    def test_"),
     "fuzz.targets": ("fuzz targets", "test/fuzz/fuzz_*.c", r"^int LLVMFuzzerTestOneInput"),
     "dbc.tests": ("tests of the DBC file", "test/dbc/test_*.py", r"^    def test_"),
-    "gates.faults": ("faults for gates", "test/gates/test_planted_faults.py", r"^    \("),
+    "gates.faults": ("faults for gates", "test/gates/test_seeded_faults.py", r"^    \("),
     "verdicts.tests": ("tests of the verdicts", "test/support/test_*verdict.py", r"^    def test_"),
 }
 

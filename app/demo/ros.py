@@ -106,7 +106,7 @@ class Drive:
 
 
 def tell(rig, peer, view):
-    state = peer.reader("iwheel/state", "std_msgs/msg/String", kept=True)
+    state = peer.reader("iwheel/state", "std_msgs/msg/String", transient=True)
     if state.wait(lambda message: '"gateway":"up"' in message.data, 10) is None:
         raise Failed("the bridge does not connect to the gateway")
     drive = Drive(peer, view)

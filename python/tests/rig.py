@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The real gateway with simulated wheels for one test, and what their bus says about it."""
+"""The real gateway with simulated wheels for one test, and checks of the frames on their bus."""
 
 import os
 import sys
@@ -20,9 +20,9 @@ EXAMPLES = os.path.join(ROOT, "python", "examples")
 
 
 class RigCase(unittest.TestCase):
-    """`self.rig` runs; `self.socket` is the gateway's."""
+    """`self.rig` runs; `self.socket` is the socket of its gateway."""
 
-    # A busy machine may be late; how late the gateway may be is not what these tests ask.
+    # Generous limits: a busy machine may be late, and these tests do not judge how late the gateway may be.
     config: dict = {"drive": {"lease_ms": 300}, "limits": {"echo_ms": 200, "wheel_silent_ms": 200}}
 
     def setUp(self):
@@ -32,11 +32,11 @@ class RigCase(unittest.TestCase):
         self.socket = self.rig.path("gateway.sock")
 
     def last_motion_us(self):
-        """When the last nonzero setpoint was on the bus; 0: never."""
+        """Time of the last nonzero setpoint on the bus; 0: none."""
         return max((t for t, _, speed in self.rig.bus.setpoints() if speed != 0), default=0)
 
     def assert_stood_by(self, t_us, within_ms):
-        """No nonzero setpoint later than that, and zeros came after the last one."""
+        """Asserts that no nonzero setpoint came later than that, and that zeros followed the last one."""
         last = self.last_motion_us()
         self.assertGreater(last, 0, "the wheels never moved: this test would prove nothing")
         hold((last - t_us) / 1000 < within_ms + ALWAYS_US / 1000, f"motion {(last - t_us) / 1000:.0f} ms later, {within_ms} ms allowed")
@@ -46,7 +46,7 @@ class RigCase(unittest.TestCase):
     def wait_until(self, condition, seconds=3.0):
         deadline = time.monotonic() + seconds
         while not condition():
-            self.assertLess(time.monotonic(), deadline, "did not come about")
+            self.assertLess(time.monotonic(), deadline, "the condition did not become true")
             time.sleep(0.01)
 
 

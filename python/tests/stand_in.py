@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A stand-in for the gateway in the test's own event loop: thousands of connections, arms and drives in seconds.
+"""A stand-in for the gateway in the test's own event loop: it serves thousands of connections, arms and drives in seconds.
 
-Its wheels stand at once. It stores per connection what was asked, so that a test can judge the end of each permission to drive.
+Its wheels stop immediately. It stores the requests of each connection, so that a test can judge the end of each permission to drive.
 """
 
 import asyncio
@@ -9,7 +9,7 @@ import json
 import random
 
 ARMED = {"lease_ms": 200, "first_lease_ms": 1000, "stop_budget_ms": 900, "stop_budget_mm": 400, "warnings": []}
-STANDS = {"at_rest": True, "applied_mm_s": 0}
+STANDSTILL = {"at_rest": True, "applied_mm_s": 0}
 EVENT_S = 0.0005
 
 
@@ -26,13 +26,13 @@ class Client(asyncio.Protocol):
 
     def connection_made(self, transport):
         self.transport, self.open = transport, True
-        self.later(lambda: self.say({"event": "hello", "api": 1, "client": self.number}))
+        self.later(lambda: self.send({"event": "hello", "api": 1, "client": self.number}))
 
     def connection_lost(self, _):
         self.open = False
 
     def later(self, call):
-        """At once, in the next round of the loop, or up to 1 ms later: a reply meets a cancellation at every instant."""
+        """Calls immediately, in the next round of the loop, or up to 1 ms later, so a reply meets a cancellation at every instant."""
         how = self.gateway.random.random()
         loop = asyncio.get_running_loop()
         if how < 0.3:
@@ -42,7 +42,7 @@ class Client(asyncio.Protocol):
         else:
             loop.call_later(how / 1000, call)
 
-    def say(self, message):
+    def send(self, message):
         if self.open:
             self.transport.write(json.dumps(message).encode() + b"\n")
 
@@ -57,7 +57,7 @@ class Client(asyncio.Protocol):
         if request["cmd"] == "arm":
             reply.update(ARMED)
         elif request["cmd"] == "status":
-            reply.update(left=STANDS, right=STANDS, lease={"holder": None})
+            reply.update(left=STANDSTILL, right=STANDSTILL, lease={"holder": None})
         elif request["cmd"] == "drive":
             reply.update({key: request.get(key, 0) for key in ("left_mm_s", "right_mm_s", "left_mA", "right_mA")}, limited=False)
         elif request["cmd"] == "watch":
@@ -65,16 +65,16 @@ class Client(asyncio.Protocol):
             self.tick()
         if request["cmd"] in self.gateway.refused:
             reply = {"id": request["id"], "ok": False, "error": "latched", "message": "a test refuses it"}
-        self.later(lambda: self.say(reply))
+        self.later(lambda: self.send(reply))
 
     def tick(self):
         if self.open:
-            self.say({"event": "state", "state": "armed"})
+            self.send({"event": "state", "state": "armed"})
             asyncio.get_running_loop().call_later(EVENT_S, self.tick)
 
     @property
     def may_drive(self):
-        """Armed since the last stop, and still connected."""
+        """True if armed since the last stop and still connected."""
         cmds = [cmd for _, cmd in self.asked]
         stops = max((n for n, cmd in enumerate(cmds) if cmd == "stop"), default=-1)
         return self.open and "arm" in cmds[stops + 1 :]

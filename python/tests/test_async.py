@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""AsyncGateway and AsyncArmed against the real daemon."""
+"""AsyncGateway and AsyncArmed with the real daemon."""
 
 import asyncio
 import signal
@@ -16,7 +16,7 @@ class Async(RigCase):
     def run_async(self, coroutine, seconds=20):
         return asyncio.run(asyncio.wait_for(coroutine, seconds))
 
-    def test_drives_and_stands_at_the_end_of_the_block(self):
+    def test_drives_and_is_at_standstill_after_the_block(self):
         async def story():
             async with AsyncGateway(self.socket).arm("example") as wheels:
                 return await wheels.drive_for(0.5, 200, 200)
@@ -40,7 +40,7 @@ class Async(RigCase):
 
         self.assert_stood_by(self.run_async(story()), 500)
 
-    def test_a_task_cancelled_twice_leaves_at_once_and_the_wheels_stop(self):
+    def test_task_cancelled_twice_ends_promptly_and_wheels_stop(self):
         async def drive():
             async with AsyncGateway(self.socket).arm() as wheels:
                 await wheels.drive_for(60, 300, 300)
@@ -97,20 +97,20 @@ class Async(RigCase):
 
         self.assertIn(self.run_async(story()), ("listening", "stopping"))
 
-    def test_a_lost_lease_is_told_while_its_events_are_still_unread(self):
+    def test_lost_lease_with_unread_events_is_reported(self):
         async def story():
             async with AsyncGateway(self.socket) as gateway:
                 await gateway.watch("lease", "stop")
                 wheels = await gateway.arm()
                 await wheels.drive(200, 200)
-                time.sleep(1.4)  # The loop does not run: what has come is still in the socket.
+                time.sleep(1.4)  # The loop does not run, so the received events are still in the socket.
                 with self.assertRaises(LeaseEnded):
                     await wheels.drive_for(1, 200, 200)
                 return [event.get("change", event.get("cause")) async for event in gateway.events(timeout=0.3)]
 
         self.assertEqual(self.run_async(story()), ["gained", "lease_lost", "lost"])
 
-    def test_a_connection_whose_end_is_still_unread_is_an_ended_lease(self):
+    def test_connection_end_not_yet_read_counts_as_ended_lease(self):
         async def story():
             async with AsyncGateway(self.socket) as gateway:
                 wheels = await gateway.arm()
@@ -134,7 +134,7 @@ class Async(RigCase):
         self.assertEqual(self.run_async(story()), "stale_command")
         self.assert_stood_by(now_us(), 0)
 
-    def test_a_task_cancelled_while_it_waits_to_arm_leaves_nothing_armed(self):
+    def test_task_cancelled_while_arming_leaves_nothing_armed(self):
         async def drive():
             async with AsyncGateway(self.socket).arm(wait=30):
                 pass
@@ -153,16 +153,16 @@ class Async(RigCase):
 
         self.assertIsNone(self.run_async(story()))
 
-    def test_drive_for_tells_on_the_way_and_true_ends_it(self):
+    def test_drive_for_reports_status_and_true_ends_it(self):
         seen = []
 
-        def tell(status):
+        def collect(status):
             seen.append(status["left"]["speed_mm_s"])
             return seen[-1] > 150
 
         async def story():
             async with AsyncGateway(self.socket).arm() as wheels:
-                return await wheels.drive_for(30, 300, 300, on_status=tell, rate_hz=40)
+                return await wheels.drive_for(30, 300, 300, on_status=collect, rate_hz=40)
 
         begin = time.monotonic()
         self.assertEqual(self.run_async(story()).left_mm_s, 300)
@@ -170,7 +170,7 @@ class Async(RigCase):
         self.assertGreater(len(seen), 3)
         self.assert_stood_by(now_us(), 0)
 
-    def test_what_the_gateway_replies_is_handed_out(self):
+    def test_replies_of_the_gateway_are_returned(self):
         async def story():
             async with AsyncGateway(self.socket) as gateway:
                 self.assertEqual((await gateway.confirm("wheel_radius", 192.0))["state"], "confirmed")
@@ -204,7 +204,7 @@ class Async(RigCase):
 
         self.assertGreater(max(self.run_async(story())), 150)
 
-    def test_events_tell_of_a_restart(self):
+    def test_events_report_a_restart(self):
         async def story():
             seen = []
             async with AsyncGateway(self.socket, wait=5) as gateway:

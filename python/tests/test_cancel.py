@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A cancelled task ends, whatever it waits for, and its wheels stop: on every Python that the package supports."""
+"""A cancelled task ends during any wait, and its wheels stop: on every Python version that the package supports."""
 
 import asyncio
 import gc
@@ -19,17 +19,17 @@ from iwheel import AsyncGateway, Refused
 
 COUNT = int(os.environ.get("IWHEEL_CANCELLATIONS", "2400"))
 END_S = 0.1
-"""A cancelled task ends this soon, its stop included where the wheels stand already."""
+"""A cancelled task ends within this time, including its stop if the wheels are already at standstill."""
 AT_MOST_S = 0.004
-"""Cancellations come between the start of the task and this: while it connects, arms, drives, leaves."""
+"""Cancellations come within this time after the start of the task: while it connects, arms, drives, leaves."""
 
 
 LOST = []
-"""Not empty: a cancellation was lost LOST_S ago. The tasks then end, and the test can report it."""
+"""Not empty: the cancellation was lost LOST_S ago. The tasks then end, and the test can report it."""
 LOST_S = 5
 
 
-# What a task does when it is cancelled --------------------------------------------------------------------------------
+# The work of a task when it is cancelled ------------------------------------------------------------------------------
 
 
 async def drives_in_a_block(path):
@@ -74,7 +74,7 @@ async def reads_events(path):
 TASKS = (drives_in_a_block, asks_and_drives, drives_for, drives_without_a_block, arms_again_and_again, reads_events)
 
 
-# How it is cancelled: each returns the instant ------------------------------------------------------------------------
+# The ways to cancel it: each returns the time -------------------------------------------------------------------------
 
 
 async def by_cancel(work, seconds):
@@ -127,12 +127,12 @@ WAYS = [by_cancel, by_wait_for] + ([by_timeout, by_a_group] if sys.version_info 
 
 
 ON_ITS_WAY = 2
-"""Commands that may come after the instant: the one that was sent, and one more while wait_for of Python 3.10 takes its rounds of the loop."""
+"""Commands that may come later: the one in flight, and one more while wait_for of Python 3.10 needs some rounds of the loop."""
 
 
 class Stall:
-    """By how much a task that sleeps 1 ms was late in all: what the machine, not the client, adds to a time. A task that ends takes several rounds
-    of the loop, and a busy machine can hold up each of them."""
+    """Total delay of a task that sleeps 1 ms: the time that the machine, not the client, adds. A task that ends needs several rounds
+    of the loop, and a busy machine can delay each of them."""
 
     async def __aenter__(self):
         self.late, self.begin = 0.0, time.monotonic()
@@ -143,7 +143,7 @@ class Stall:
         self.task.cancel()
 
     async def sleep(self):
-        self.late = time.monotonic() - self.begin  # Before the first round an instant is chosen; a stall between them is one, too.
+        self.late = time.monotonic() - self.begin  # The instant is chosen before the first round; a delay between the two counts too.
         while True:
             before = time.monotonic()
             await asyncio.sleep(0.001)
@@ -151,7 +151,7 @@ class Stall:
 
 
 class Cancelled(unittest.TestCase):
-    """Against a stand-in for the gateway."""
+    """Tests with a stand-in for the gateway."""
 
     def setUp(self):
         LOST.clear()
@@ -176,13 +176,13 @@ class Cancelled(unittest.TestCase):
             at = await way(task(path), seconds)
             took = time.monotonic() - at
         signal.setitimer(signal.ITIMER_REAL, 0)
-        await asyncio.sleep(0.002)  # What is in the socket reaches the stand-in.
+        await asyncio.sleep(0.002)  # The stand-in reads the rest of the socket.
         for client in stand_in.clients[before:]:
             if task is not drives_without_a_block:
-                self.assertFalse(client.drove_since_stop(), "its block was left without a stop")
+                self.assertFalse(client.drove_since_stop(), "its block ended without a stop")
             self.assertFalse(client.may_drive, "still armed and connected")
             self.assertLessEqual(client.drives_since(at + stall.late), ON_ITS_WAY)
-        self.assertLess(took, END_S + stall.late, f"took {took * 1000:.1f} ms, of which the machine held it up for {stall.late * 1000:.1f} ms")
+        self.assertLess(took, END_S + stall.late, f"took {took * 1000:.1f} ms, of which the machine delayed it by {stall.late * 1000:.1f} ms")
 
     def test_cancelled_at_any_instant_each_task_ends_and_stops(self):
         instants = random.Random(35)
@@ -215,7 +215,7 @@ class Cancelled(unittest.TestCase):
 
         self.with_stand_in(story)
 
-    def test_cancelled_again_while_it_stops_it_ends_at_once(self):
+    def test_task_cancelled_again_while_stopping_ends_immediately(self):
         instants = random.Random(36)
 
         async def story(stand_in, path):
@@ -247,7 +247,7 @@ class Cancelled(unittest.TestCase):
 
 
 class Dropped(unittest.TestCase):
-    """Connections end with what they belong to. Selected with the cancellations: a dropped task is the same kind."""
+    """Connections end with their owner. Selected together with the cancellations: a dropped task is the same kind."""
 
     with_stand_in = Cancelled.with_stand_in
 
@@ -258,14 +258,14 @@ class Dropped(unittest.TestCase):
 
     def test_refused_arms_leave_no_connection_to_cancel(self):
         async def story(stand_in, path):
-            kept = []
+            stored = []
             for _ in range(50):
                 try:
                     async with AsyncGateway(path).arm("retry"):
                         pass
                 except Refused as refusal:
-                    kept.append(refusal)  # With its traceback, and all that stands in there.
-            self.assertEqual(len(kept), 50)
+                    stored.append(refusal)  # Its traceback refers to all objects of the call.
+            self.assertEqual(len(stored), 50)
             self.assertEqual(await self.open_after(stand_in), 0)
 
         self.with_stand_in(story, refused=("arm",))
@@ -282,16 +282,16 @@ class Dropped(unittest.TestCase):
         self.with_stand_in(story)
 
     def test_a_gateway_serves_one_event_loop_after_the_other(self):
-        kept = []
+        stored = []
 
         async def story(stand_in, path):
-            kept[:] = kept or [AsyncGateway(path)]
-            kept[0]._path = path
-            await kept[0].status()
+            stored[:] = stored or [AsyncGateway(path)]
+            stored[0]._path = path
+            await stored[0].status()
 
         for _ in range(3):
             self.with_stand_in(story)
-        kept[0].close()
+        stored[0].close()
 
     def test_a_dropped_task_cancels_its_permission(self):
         async def story(stand_in, path):
@@ -315,7 +315,7 @@ class Dropped(unittest.TestCase):
 
 
 class CancelledWithRig(RigCase):
-    """Against the real gateway with simulated wheels."""
+    """Tests with the real gateway and simulated wheels."""
 
     def test_cancelled_once_each_of_300_tasks_that_ask_ends(self):
         async def ask(gateway):
@@ -367,12 +367,12 @@ class CancelledWithRig(RigCase):
         for number in end:
             child.send_signal(number)
         ended_us = now_us()
-        _, said = child.communicate(timeout=10)
+        _, output = child.communicate(timeout=10)
         time.sleep(0.8)
         self.assert_stood_by(ended_us, 1100)
-        self.assertNotIn("Exception ignored", said)
-        self.assertNotIn("was destroyed", said)
-        return said
+        self.assertNotIn("Exception ignored", output)
+        self.assertNotIn("was destroyed", output)
+        return output
 
     DRIVE = (
         "async def drive():\n"
@@ -382,8 +382,8 @@ class CancelledWithRig(RigCase):
     )
 
     def test_cancelled_by_ctrl_c_the_wheels_stop(self):
-        said = self.run_program(self.DRIVE + "asyncio.run(drive())\n", signal.SIGINT)
-        self.assertIn("KeyboardInterrupt", said)
+        output = self.run_program(self.DRIVE + "asyncio.run(drive())\n", signal.SIGINT)
+        self.assertIn("KeyboardInterrupt", output)
 
     def test_cancelled_by_the_end_of_its_loop_the_wheels_stop(self):
         self.run_program(self.DRIVE + "async def main():\n    task = asyncio.ensure_future(drive())\n    await asyncio.sleep(1.2)\nasyncio.run(main())\n")
@@ -422,7 +422,7 @@ class CancelledWithRig(RigCase):
         )
 
     def test_killed_or_cancelled_a_forked_child_holds_nothing(self):
-        said = self.run_program(
+        output = self.run_program(
             self.DRIVE.replace(
                 "        while True",
                 "        await w.drive(200, 200)\n"
@@ -435,7 +435,7 @@ class CancelledWithRig(RigCase):
             + "asyncio.run(drive())\n",
             signal.SIGKILL,
         )
-        self.assertIn("refused", said)
+        self.assertIn("refused", output)
 
 
 if __name__ == "__main__":

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The examples, used as a person would."""
+"""The examples, used as a person would use them."""
 
 import csv
 import itertools
@@ -83,7 +83,7 @@ class Examples(RigCase):
         self.wait_until(lambda: self.holder() == "gamepad", 5)
         os.write(pad, self.event(-32767, 2, 1))
         time.sleep(0.4)
-        self.assertEqual(self.last_motion_us(), 0, "it moved without the dead man's button")
+        self.assertEqual(self.last_motion_us(), 0, "it moved without the hold-to-run button")
         os.write(pad, self.event(1, 1, 4))
         time.sleep(0.5)
         self.assertGreater(self.last_motion_us(), 0)
@@ -125,7 +125,7 @@ class Examples(RigCase):
         time.sleep(1.8)
         self.assert_stood_by(last_us, 2000 + 150 + 700)
         self.assertIn("stopped: no report of the gamepad for 2 s", os.read(child.stderr.fileno(), 1000).decode())
-        os.write(pad, self.event(-32000, 2, 1))  # The link is back, the button was never let go.
+        os.write(pad, self.event(-32000, 2, 1))  # The link is back, and the button was never released.
         time.sleep(0.5)
         self.assert_stood_by(last_us, 2000 + 150 + 700)
         os.write(pad, self.event(0, 1, 4) + self.event(1, 1, 4))
@@ -142,7 +142,7 @@ class Examples(RigCase):
         gaps = sorted(t for t, _, speed in self.rig.bus.setpoints() if speed != 0 and t > last_us + 500_000)
         self.assertLess(max(b - a for a, b in itertools.pairwise(gaps)), 200_000, "it stopped in between")
 
-    def test_gamepad_state_from_the_kernel_is_no_evidence(self):
+    def test_gamepad_state_from_the_kernel_is_no_report(self):
         pad, _, last_us = self.held()
         for _ in range(8):
             time.sleep(0.4)
@@ -182,12 +182,12 @@ class Examples(RigCase):
         self.addCleanup(child.stderr.close)
         return child
 
-    def test_a_recording_says_what_it_waits_for_and_that_it_began(self):
+    def test_recording_reports_its_wait_and_its_start(self):
         self.rig.kill_gateway(signal.SIGTERM)
         child = self.recorder(self.socket, self.rig.path("a.csv"))
-        told = child.stderr.readline()
-        self.assertIn("no gateway listens there; start it", told)
-        self.assertIn("Waiting for the gateway, 60 minutes at most", told)
+        line = child.stderr.readline()
+        self.assertIn("no gateway listens there; start it", line)
+        self.assertIn("Waiting for the gateway, 60 minutes at most", line)
         self.rig.start_gateway()
         self.assertIn("recording 20 lines a second into", child.stderr.readline())
         self.rig.kill_gateway(signal.SIGKILL)
@@ -198,13 +198,13 @@ class Examples(RigCase):
         self.assertRegex(child.stderr.readline(), r"[0-9]+ lines in .*a\.csv")
         self.assertEqual(child.wait(5), 0)
 
-    def test_a_recording_for_some_seconds_ends_although_the_gateway_is_away(self):
+    def test_timed_recording_without_gateway_ends_on_time(self):
         child = self.recorder(self.socket, "--for", "1.5", self.rig.path("a.csv"))
         self.assertIn("recording", child.stderr.readline())
         self.rig.kill_gateway(signal.SIGKILL)
         self.assertEqual(child.wait(5), 0)
 
-    def test_a_recording_that_cannot_be_written_says_so_at_once(self):
+    def test_recording_that_cannot_be_written_fails_immediately(self):
         child = self.recorder(self.socket, self.rig.path("no/such/folder.csv"))
         self.assertEqual(child.wait(5), 1)
         self.assertIn("No such file", child.stderr.read())

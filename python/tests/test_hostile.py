@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Both clients against something that is no gateway, or a torn one."""
+"""Both clients with a peer that is no gateway, or a broken one."""
 
 import asyncio
 import json
@@ -13,7 +13,7 @@ import time
 import unittest
 from unittest import mock
 
-import rig  # noqa: F401  The path to the package.
+import rig  # noqa: F401  This adds the path to the package.
 
 from iwheel import AsyncGateway, Gateway, GatewayUnavailable, NoAnswer, ProtocolError, default_socket
 
@@ -22,17 +22,17 @@ NEWER = b'{"event":"hello","version":"9.1.0","api":2,"client":1}\n'
 
 
 class Impostor:
-    """Accepts one connection after another and says what it was told to, after the first request of each."""
+    """Accepts one connection after another and sends its answer after the first request of each."""
 
-    def __init__(self, says, close=False, hello=HELLO):
+    def __init__(self, answer, close=False, hello=HELLO):
         self.hello = hello
         self.folder = tempfile.TemporaryDirectory()
         self.path = os.path.join(self.folder.name, "socket")
-        self.says, self.close, self.heard = says, close, []
+        self.answer, self.close, self.received = answer, close, []
         self.listener = socket.socket(socket.AF_UNIX)
         self.listener.bind(self.path)
         self.listener.listen()
-        self.kept = []
+        self.connections = []
         threading.Thread(target=self.run, daemon=True).start()
 
     def run(self):
@@ -41,25 +41,25 @@ class Impostor:
                 connection, _ = self.listener.accept()
             except OSError:
                 return
-            self.kept.append(connection)
+            self.connections.append(connection)
             try:
                 connection.sendall(self.hello)
-                self.heard.append(connection.recv(5000))
-                connection.sendall(self.says)
+                self.received.append(connection.recv(5000))
+                connection.sendall(self.answer)
             except OSError:
                 pass
             if self.close:
                 connection.close()
 
     def end(self):
-        for connection in self.kept:
+        for connection in self.connections:
             connection.close()
         self.listener.close()
         self.folder.cleanup()
 
 
 def as_nobody(call):
-    """The text of what it raises in a child without root's rights."""
+    """The text of the exception that the call raises in a child without root's rights."""
     reading, writing = os.pipe()
     child = os.fork()
     if child == 0:
@@ -79,20 +79,20 @@ def as_nobody(call):
 
 
 def backlog():
-    """What has piled up: 900 snapshots, and among them what must not be lost with them."""
+    """A backlog: 900 snapshots, and among them events that must not be lost with them."""
     events = [{"event": "state", "number": number} for number in range(900)]
     events[100:100] = [{"event": "fault", "cause": "bus_down"}, {"event": "fault", "cause": "overspeed"}, {"event": "lost", "count": 40}]
     return b"".join(json.dumps(event).encode() + b"\n" for event in [{"id": 1, "ok": True}, *events])
 
 
 class Slow(unittest.TestCase):
-    """Who reads slowly and wants the latest values."""
+    """A client that reads slowly and wants the latest values."""
 
     def judge(self, events):
         states = [event["number"] for event in events if event["event"] == "state"]
         self.assertEqual(states, sorted(states))
         self.assertEqual(states[-1], 899)
-        self.assertLess(len(states), 50)  # As often as was read in between.
+        self.assertLess(len(states), 50)  # One per read.
         self.assertEqual({event["cause"] for event in events if event["event"] == "fault"}, {"bus_down", "overspeed"})
         self.assertEqual(sum(event["count"] for event in events if event["event"] == "lost"), 900 - len(states) + 40)
 
@@ -131,8 +131,8 @@ class Slow(unittest.TestCase):
 
 
 class Hostile(unittest.TestCase):
-    def both(self, says, error, close=False, ask="status", hello=HELLO):
-        impostor = Impostor(says, close, hello)
+    def both(self, answer, error, close=False, ask="status", hello=HELLO):
+        impostor = Impostor(answer, close, hello)
         self.addCleanup(impostor.end)
 
         async def ask_async():
@@ -162,24 +162,24 @@ class Hostile(unittest.TestCase):
     def test_an_answer_to_something_else_is_no_answer(self):
         self.both(b'{"id":77,"ok":true}\n', NoAnswer)
 
-    def test_who_does_not_say_hello_is_no_answer_and_is_asked_nothing(self):
-        impostor, told = self.both(b"", NoAnswer, hello=b"")
-        self.assertIn("sent no greeting", told)
+    def test_peer_without_hello_is_no_answer_and_gets_no_request(self):
+        impostor, text = self.both(b"", NoAnswer, hello=b"")
+        self.assertIn("sent no greeting", text)
         self.wait_for_two(impostor)
-        self.assertEqual(impostor.heard, [b"", b""])
+        self.assertEqual(impostor.received, [b"", b""])
 
     def wait_for_two(self, impostor):
         deadline = time.monotonic() + 2
-        while len(impostor.heard) < 2 and time.monotonic() < deadline:
+        while len(impostor.received) < 2 and time.monotonic() < deadline:
             time.sleep(0.01)
 
-    def test_a_newer_protocol_is_refused_in_words_before_anything_is_asked(self):
+    def test_newer_protocol_in_hello_is_refused_before_any_request(self):
         for ask in ("status", "arm", "watch"):
             with self.subTest(ask):
-                impostor, told = self.both(b"", ProtocolError, hello=NEWER, ask=ask)
-                self.assertRegex(told, r"\(version 9\.1\.0\) has the northbound protocol 2, this .* supports it up to 1; install")
+                impostor, text = self.both(b"", ProtocolError, hello=NEWER, ask=ask)
+                self.assertRegex(text, r"\(version 9\.1\.0\) has the northbound protocol 2, this .* supports it up to 1; install")
                 self.wait_for_two(impostor)
-                self.assertEqual(impostor.heard, [b"", b""])
+                self.assertEqual(impostor.received, [b"", b""])
 
     def test_a_newer_protocol_is_not_waited_for(self):
         impostor = Impostor(b"", hello=NEWER)
@@ -191,7 +191,7 @@ class Hostile(unittest.TestCase):
             asyncio.run(AsyncGateway(impostor.path, wait=30).status())
         self.assertLess(time.monotonic() - begin, 5)
 
-    def test_a_newer_protocol_is_still_told_to_stop(self):
+    def test_newer_protocol_still_gets_stop_and_estop(self):
         for ask in ("stop", "estop"):
             with self.subTest(ask):
                 impostor = Impostor(b'{"id":1,"ok":true,"state":"stopping"}\n', hello=NEWER)
@@ -200,27 +200,27 @@ class Hostile(unittest.TestCase):
                     self.assertEqual(getattr(gateway, ask)(), "stopping")
                     with self.assertRaises(ProtocolError):
                         gateway.status()
-                self.assertEqual(json.loads(impostor.heard[0])["cmd"], ask)
+                self.assertEqual(json.loads(impostor.received[0])["cmd"], ask)
 
     def test_garbage_is_a_protocol_error(self):
-        for says in (b"SSH-2.0-x\r\n", b"[]\n", b'{"a":1}\n', b"\xff\xfe\n", b'{"ok":true,"event":"x"}\n', b"\n"):
-            with self.subTest(says):
-                self.both(says, ProtocolError)
+        for answer in (b"SSH-2.0-x\r\n", b"[]\n", b'{"a":1}\n', b"\xff\xfe\n", b'{"ok":true,"event":"x"}\n', b"\n"):
+            with self.subTest(answer):
+                self.both(answer, ProtocolError)
 
     def test_json_without_end_of_depth_is_a_protocol_error(self):
-        for says in (b"[" * 60000 + b"\n", b'{"event":' * 7000 + b"\n"):
-            self.both(says, ProtocolError)
+        for answer in (b"[" * 60000 + b"\n", b'{"event":' * 7000 + b"\n"):
+            self.both(answer, ProtocolError)
 
     def test_a_number_or_name_of_another_type_is_a_protocol_error(self):
-        for says in (b'{"id":[1],"ok":true}\n', b'{"id":{},"ok":true}\n', b'{"event":[]}\n', b'{"event":null}\n'):
-            with self.subTest(says):
-                self.both(says, ProtocolError)
+        for answer in (b'{"id":[1],"ok":true}\n', b'{"id":{},"ok":true}\n', b'{"event":[]}\n', b'{"event":null}\n'):
+            with self.subTest(answer):
+                self.both(answer, ProtocolError)
 
     def test_a_lease_does_not_stay_after_a_reply_that_cannot_be_used(self):
-        for says in (b"[" * 60000 + b"\n", b'{"id":1,"ok":true}\n'):
+        for answer in (b"[" * 60000 + b"\n", b'{"id":1,"ok":true}\n'):
             for ask in (self.ask_blocking, self.ask_async):
-                with self.subTest(says[:20], ask=ask.__name__):
-                    impostor = Impostor(says)
+                with self.subTest(answer[:20], ask=ask.__name__):
+                    impostor = Impostor(answer)
                     self.addCleanup(impostor.end)
                     ask(impostor)
 
@@ -240,8 +240,8 @@ class Hostile(unittest.TestCase):
         asyncio.run(story())
 
     def ended(self, impostor):
-        impostor.kept[0].settimeout(1)
-        self.assertEqual(impostor.kept[0].recv(100), b"", "the connection, and with it the lease, is still there")
+        impostor.connections[0].settimeout(1)
+        self.assertEqual(impostor.connections[0].recv(100), b"", "the connection, and with it the lease, is still there")
 
     def test_a_program_with_2000_open_files_stops(self):
         soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
@@ -263,18 +263,18 @@ class Hostile(unittest.TestCase):
     def test_a_closed_connection_is_unavailable(self):
         self.both(b"", GatewayUnavailable, close=True)
 
-    def test_too_many_clients_is_told(self):
-        says = b'{"id":null,"ok":false,"error":"too_many_clients","message":"close another one"}\n'
-        self.both(says, GatewayUnavailable, close=True)
+    def test_too_many_clients_is_reported(self):
+        answer = b'{"id":null,"ok":false,"error":"too_many_clients","message":"close another one"}\n'
+        self.both(answer, GatewayUnavailable, close=True)
 
     def test_arm_is_never_asked_twice(self):
         impostor = Impostor(b"", close=True)
         self.addCleanup(impostor.end)
         with self.assertRaises(GatewayUnavailable):
             Gateway(impostor.path).arm()
-        self.assertEqual([json.loads(line)["cmd"] for line in impostor.heard], ["arm"])
+        self.assertEqual([json.loads(line)["cmd"] for line in impostor.received], ["arm"])
 
-    def test_nobody_there_and_no_rights_tell_the_cure(self):
+    def test_missing_gateway_and_missing_rights_name_the_fix(self):
         with self.assertRaisesRegex(GatewayUnavailable, "no gateway listens there; start it"):
             Gateway("/nonexistent/socket").status()
         impostor = Impostor(b"")
@@ -282,13 +282,13 @@ class Hostile(unittest.TestCase):
         os.chmod(impostor.path, 0)
         self.assertIn("this user may not use it; join its group", as_nobody(Gateway(impostor.path).status))
 
-    def test_the_socket_of_the_environment_is_taken(self):
+    def test_socket_of_the_environment_is_used(self):
         before = os.environ.get("IWHEEL_SOCKET")
         os.environ["IWHEEL_SOCKET"] = "/tmp/somewhere.sock"
         self.addCleanup(lambda: os.environ.pop("IWHEEL_SOCKET") if before is None else None)
         self.assertEqual(default_socket(), "/tmp/somewhere.sock")
 
-    def test_of_a_gateways_two_sockets_the_one_that_may_be_used_is_taken(self):
+    def test_two_sockets_of_gateway_the_permitted_one_is_chosen(self):
         folder = tempfile.mkdtemp()
         self.addCleanup(shutil.rmtree, folder)
         os.chmod(folder, 0o755)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""share/northbound.json against the real gateway: what it sends in every state, what it takes, and the client's types."""
+"""share/northbound.json with the real gateway: its messages in every state, the requests that it accepts, and the client's types."""
 
 import json
 import os
@@ -23,23 +23,23 @@ from described import Description
 from northbound import camel
 
 TOPICS = ["state", "bus", "estop", "lease", "stop", "force", "frame"]
-# What this rig cannot bring about, with the reason. Everything else must be seen.
-A_BOARD = "only a gateway without a file of its own has it: a microcontroller"
+# Parts that this rig cannot produce, with the reason. All other parts must be seen.
+A_BOARD = "only a gateway without its own file has it: a microcontroller"
 UNSEEN = {
     **dict.fromkeys([f"reply to config.{field}: a value" for field in ("keys", "restarts", "staged")], A_BOARD),
     **dict.fromkeys([f"configured_entry.{what}" for what in ("key: a value", "value: a value", "value: null")], A_BOARD),
     "bus_status.bitrate: a value": "a local bus has none",
     "bus_status.sample_point_permille: a value": "a local bus has none",
-    "event offset.offset_mN: null": "a zero is replaced, and never taken away",
+    "event offset.offset_mN: null": "a zero is replaced, and never removed",
     "bus_status.load_permille: a value": "a local bus is not measured",
     "bus_status.lost_frames: a value": "a local bus is not measured",
     "reply to arm.key: left out": A_BOARD,
-    "estop_status.tried_wall_us: a value": "a simulated button is never tried; test/kernel has a line of the kernel",
+    "estop_status.tried_wall_us: a value": "a simulated button is never tested; test/kernel has a line of the kernel",
 }
 
 
 class Witness:
-    """Checks what the gateway sends against the description, and remembers what of the description was seen."""
+    """Compares the gateway's messages with the description, and records which parts of the description it has seen."""
 
     def __init__(self):
         self.description = Description()
@@ -78,7 +78,7 @@ class Witness:
                 self._remember(field["type"], one, self.description.fields(holder))
 
     def expected(self):
-        """All that is to be seen of what was looked at from outside, and of what is in it."""
+        """All parts of the description that must be seen."""
         tops = [(f"reply to {cmd}", self.description.objects[one["reply"]]) for cmd, one in self.description.requests.items()]
         tops += [(f"event {name}", event) for name, event in self.description.events.items()]
         inner = {
@@ -89,7 +89,7 @@ class Witness:
         }
         for where, holder in tops + [(name, self.description.objects[name]) for name in sorted(inner)]:
             for name, field in self.description.fields(holder).items():
-                if name in holder["fields"] or not field.get("null"):  # Who extends an object may not have all of its states.
+                if name in holder["fields"] or not field.get("null"):  # An object that extends another may not have all of its states.
                     yield f"{where}.{name}: a value"
                 if name in holder["fields"] and field.get("null"):
                     yield f"{where}.{name}: null"
@@ -98,7 +98,7 @@ class Witness:
 
 
 class Ear(threading.Thread):
-    """Reads all that comes to a client, to the end of the connection."""
+    """Reads all events of a client until the connection ends."""
 
     def __init__(self, client):
         super().__init__(daemon=True)
@@ -114,14 +114,14 @@ class Ear(threading.Thread):
         except (Closed, OSError, ValueError):
             pass
 
-    def heard(self):
+    def events(self):
         self.join(5)
         return [line for line in self.lines if "event" in line]
 
 
 class Story(unittest.TestCase):
     maxDiff = None
-    """A gateway is led through its states; all that it sends is looked at."""
+    """Leads a gateway through its states and checks all its messages."""
 
     def setUp(self):
         folder = tempfile.TemporaryDirectory(prefix="iwheel-second-")
@@ -151,10 +151,10 @@ class Story(unittest.TestCase):
         return reply
 
     def wait(self, client, condition, seconds=5.0):
-        """Asks for the status until it is so."""
+        """Polls the status until the condition is true."""
         deadline = time.monotonic() + seconds
         while not condition(self.ask(client, "status")):
-            self.assertLess(time.monotonic(), deadline, "did not come about")
+            self.assertLess(time.monotonic(), deadline, "the condition did not become true")
             time.sleep(0.02)
 
     def wait_granted(self, client, cmd, seconds=5.0, **fields):
@@ -176,25 +176,25 @@ class Story(unittest.TestCase):
             self.ask(client, "drive", left_mm_s=left, right_mm_s=right)
             time.sleep(0.05)
 
-    def hear(self, client):
+    def judge_events(self, client):
         for event in client.collect():
             self.witness.event(event)
         client.events.clear()
 
-    def test_all_that_the_gateway_sends_is_described_and_all_that_is_described_is_sent(self):
+    def test_gateway_messages_match_the_description_both_ways(self):
         self.rig.sim.ask("mute both")
         self.rig.sim.ask("raw left 32767")
         self.rig.start_gateway(wheels=False)
         self.ears = [Ear(self.connect(*(topic for topic in TOPICS if topic != "frame"))), Ear(self.connect("frame"))]
-        slow = self.connect("frame")  # It does not read, and so loses some.
+        slow = self.connect("frame")  # This client does not read, so it loses events.
         me, other = self.connect(), self.connect()
         for part in (self.without_wheels, self.wheels_appear, self.rolling, self.zeros, self.driving, self.stops, self.bus, self.files):
             part(me, other)
-        self.assertIsNotNone(slow.wait_event("lost"))  # The gateway writes it once there is room again.
-        self.hear(slow)
+        self.assertIsNotNone(slow.wait_event("lost"))  # The gateway sends this event when the socket has space again.
+        self.judge_events(slow)
         self.rig.kill_gateway(signal.SIGTERM)
         for ear in self.ears:
-            for event in ear.heard():
+            for event in ear.events():
                 self.witness.event(event)
         self.another_start()
         self.assertEqual(self.witness.complaints[:20], [])
@@ -264,7 +264,7 @@ class Story(unittest.TestCase):
         name = self.ask(me, "recordings")["recordings"][-1]["name"]
         self.ask(me, "recording", name=f"{name}.log")
         folder = os.path.dirname(self.ask(me, "why")["recording"])
-        for rest in ("stop-000098-rest.conf", "stop-000099-rest.log"):  # As a crash leaves them.
+        for rest in ("stop-000098-rest.conf", "stop-000099-rest.log"):  # A crash leaves such files.
             with open(os.path.join(folder, rest), "w", encoding="ascii"):
                 pass
         self.ask(me, "recordings")
@@ -293,7 +293,7 @@ class Story(unittest.TestCase):
         self.wait_rest(me)
 
     def files(self, me, _):
-        """What cannot be written: a file is where the directory was."""
+        """Replaces the directory by a file, so that nothing can be written there."""
         shutil.rmtree(self.records)
         with open(self.records, "w", encoding="utf-8"):
             pass
@@ -305,7 +305,7 @@ class Story(unittest.TestCase):
         os.mkdir(self.records)
 
     def another_start(self):
-        """Without a setpoint type, and with the second contact of the e-stop."""
+        """Starts without a setpoint type, and with the second contact of the e-stop."""
         del self.rig.settings["wheels"]["setpoint_type"]
         self.rig.settings["estop"] = {"line": self.rig.estop_line(), "line2": f"unix:{self.second}"}
         self.rig.write_config()
@@ -314,7 +314,7 @@ class Story(unittest.TestCase):
         me = self.connect("estop")
         self.rig.sim.ask("contact 2 press")
         self.wait(me, lambda s: s["estop"]["pressed_at"] == "line2" and "estop_disagrees" in s["present"])
-        self.hear(me)
+        self.judge_events(me)
 
 
 class Requests(RigCase):
@@ -327,7 +327,7 @@ class Requests(RigCase):
         return self.client.request(cmd, **fields).get("error")
 
     def example(self, field):
-        """A value of that type, and one of another."""
+        """A value of that type, and a value of another type."""
         kind = field["type"] if isinstance(field["type"], str) else field["type"][0]
         value = {"integer": 1, "boolean": False, "text": "x"}.get(kind) or (
             next(iter(self.description.words[kind])) if kind in self.description.words else {"boolean": False}.get(kind)
@@ -335,10 +335,10 @@ class Requests(RigCase):
         return ([value], {}) if field.get("list") else (value, {})
 
     def needed(self, request):
-        named = {"name": "stop-000001-none.log"} if request["reply"] == "piece" else {}  # One with the form that is asked for.
+        named = {"name": "stop-000001-none.log"} if request["reply"] == "piece" else {}  # A name of the required form.
         return {**{name: self.example(field)[0] for name, field in request["fields"].items() if not field.get("optional")}, **named}
 
-    def test_a_request_has_the_fields_that_are_described_and_no_others(self):
+    def test_request_fields_match_the_description_exactly(self):
         names = {name for request in self.description.requests.values() for name in request["fields"]} | {"speed"}
         for cmd, request in self.description.requests.items():
             for name in sorted(names):
@@ -347,7 +347,7 @@ class Requests(RigCase):
                     error = self.error(cmd, {**self.needed(request), name: self.example(field)[0] if field else 1})
                     self.assertEqual(error == "unknown_field", field is None, error)
 
-    def test_what_is_needed_is_asked_for_and_what_is_not_is_not(self):
+    def test_required_fields_are_required_and_optional_ones_are_not(self):
         for cmd, request in self.description.requests.items():
             for name, field in request["fields"].items():
                 with self.subTest(cmd, field=name):
@@ -372,13 +372,13 @@ class Requests(RigCase):
                         self.assertEqual(error in ("bad_value", "out_of_range"), not fits, error)
 
     def edges(self, name, field):
-        """Values, and whether they are within what is described."""
+        """Values, and whether they are within the described limits."""
         kinds = field["type"] if isinstance(field["type"], list) else [field["type"]]
         words = [word for kind in kinds for word in self.description.words.get(kind, ())]
         for word in [*words, *(["horse"] if words else [])]:
             yield [word] if field.get("list") else word, word != "horse"
         if "bytes" in field:
-            if kinds == ["text"]:  # Which texts the value of an item may be, depends on the item.
+            if kinds == ["text"]:  # The permitted texts of a value depend on the item.
                 yield "x" * field["bytes"], True
             yield "x" * (field["bytes"] + 1), False
         for end, step in (("least", -1), ("most", 1)):
@@ -418,7 +418,7 @@ class Types(unittest.TestCase):
             known = getattr(_protocol, camel(name), None) or getattr(iwheel, camel(name), None)
             if known is not None:
                 fields = getattr(known, "__dataclass_fields__", known.__annotations__)
-                left_out = {"state"} if name == "terms" else set()  # Always the same.
+                left_out = {"state"} if name == "terms" else set()  # This field is always the same.
                 self.assertEqual(set(fields), set(description.fields(holder)) - left_out, name)
         for reply in {request["reply"] for request in description.requests.values()} - {"new_state"}:
             self.assertTrue(hasattr(iwheel, camel(reply)), f"{camel(reply)} is not exported")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Gateway and Armed against the real daemon: whatever happens to the program, the wheels stop."""
+"""Gateway and Armed with the real daemon: the wheels stop, whatever happens to the program."""
 
 import asyncio
 import os
@@ -19,11 +19,11 @@ from iwheel import AsyncGateway, ConnectionLost, Gateway, GatewayUnavailable, Le
 from iwheel._wire import add_piece
 
 BUDGET_MS = 987 + 100
-"""Lease, period and ramp of the default configuration of rig.py, and what a busy machine adds."""
+"""Lease, period and ramp of the configuration of rig.py, and the delay that a busy machine adds."""
 
 
 class Crowded(RigCase):
-    """Every place of the gateway is taken."""
+    """Occupies every place of the gateway."""
 
     config = {**RigCase.config, "northbound": {"max_clients": 4}}
 
@@ -61,7 +61,7 @@ class Crowded(RigCase):
 
 
 class Driving(RigCase):
-    def test_the_example_of_the_documentation_drives_and_stands_at_the_end(self):
+    def test_documented_example_drives_and_ends_at_standstill(self):
         with Gateway(self.socket).arm("example") as wheels:
             applied = wheels.drive_for(0.6, 200, 200)
         left_us = now_us()
@@ -119,7 +119,7 @@ class Driving(RigCase):
         self.assertNotEqual(child.returncode, 0)
         self.assert_stood_by(sent_us, 600)
         with Gateway(self.socket) as gateway:
-            # Gone: the interrupt met a request that was half sent, which only the end of the connection undoes.
+            # The connection has ended: the interrupt came while a request was half sent, and only that undoes it.
             self.assertIn(gateway.why()["cause"], ("client_stop", "client_gone"))
 
     def test_kill_9_stops_although_a_forked_child_lives_on(self):
@@ -165,7 +165,7 @@ class Driving(RigCase):
         self.addCleanup(end)
         return child
 
-    def test_leaving_a_block_that_lost_its_lease_does_not_stop_who_drives_now(self):
+    def test_block_end_after_lost_lease_stops_no_other_driver(self):
         other = Gateway(self.socket)
         self.addCleanup(other.close)
         with Gateway(self.socket) as gateway:
@@ -178,7 +178,7 @@ class Driving(RigCase):
             mine.drive(200, 200)
             self.assertEqual(other.status()["state"], "armed")
 
-    def test_an_older_permission_ends_when_the_same_gateway_arms_anew(self):
+    def test_older_permission_ends_when_same_gateway_arms_again(self):
         with Gateway(self.socket) as gateway:
             old = gateway.arm()
             new = gateway.arm()
@@ -186,7 +186,7 @@ class Driving(RigCase):
                 old.drive(200, 200)
             new.drive(0, 0)
 
-    def test_values_that_do_not_fit_are_refused_and_the_permission_stays(self):
+    def test_values_out_of_range_are_refused_and_permission_stays(self):
         with Gateway(self.socket) as gateway, gateway.arm() as wheels:
             for bad in (40000, -40000):
                 with self.assertRaises(Refused) as caught:
@@ -208,7 +208,7 @@ class Driving(RigCase):
                     wheels.drive_for(1, 0, 0, rate_hz=bad)
             self.assertTrue(wheels.drive(4000, 2000).limited)
 
-    def test_whole_numbers_of_other_types_are_taken(self):
+    def test_whole_numbers_of_other_types_are_accepted(self):
         class Index:
             def __index__(self):
                 return 100
@@ -251,7 +251,7 @@ class Arming(RigCase):
                 wheels.drive_for(0.3, 300, 300)
         self.assert_stood_by(now_us(), 0)
 
-    def test_arming_right_after_a_stop_that_nobody_waited_for_waits_until_both_stand(self):
+    def test_arm_right_after_unawaited_stop_waits_for_standstill(self):
         with Gateway(self.socket) as gateway:
             gateway.arm().drive_for(0.5, 400, 400)
             gateway.stop()
@@ -261,7 +261,7 @@ class Arming(RigCase):
                 self.assertTrue(gateway.status()["left"]["at_rest"])
                 wheels.drive(100, 100)
 
-    def test_without_waiting_the_refusal_is_raised_at_once(self):
+    def test_arm_without_wait_raises_the_refusal_immediately(self):
         with Gateway(self.socket) as gateway:
             with gateway.arm() as wheels:
                 wheels.drive_for(0.2, 300, 300)
@@ -269,7 +269,7 @@ class Arming(RigCase):
                 gateway.arm(wait=0)
             self.assertEqual(caught.exception.error, "stale_command")
 
-    def test_a_stick_that_is_held_is_waited_for_no_longer_than_told(self):
+    def test_stick_that_is_held_is_awaited_for_the_given_time_only(self):
         other = self.rig.client()
         quit_it = threading.Event()
 
@@ -290,7 +290,7 @@ class Arming(RigCase):
             self.assertGreater(time.monotonic() - begin, 0.7)
             self.assertLess(time.monotonic() - begin, 1.2)
 
-    def test_what_does_not_pass_by_itself_is_raised_at_once(self):
+    def test_permanent_refusal_is_raised_immediately(self):
         with Gateway(self.socket) as gateway:
             gateway.estop()
             begin = time.monotonic()
@@ -301,7 +301,7 @@ class Arming(RigCase):
 
 
 class Ending(RigCase):
-    """Whatever ended the permission: the first call after it says so."""
+    """For each end of the permission, the first call after it reports the end."""
 
     def lose(self, gateway):
         wheels = gateway.arm()
@@ -318,35 +318,35 @@ class Ending(RigCase):
             self.assertIsInstance(caught.exception, kind)
         return caught.exception
 
-    def test_a_lost_lease_is_told_while_its_events_are_still_unread(self):
+    def test_lost_lease_with_unread_events_is_reported(self):
         with Gateway(self.socket) as gateway:
             gateway.watch("lease", "stop")
             wheels = self.lose(gateway)
-            told = self.ended(lambda: wheels.drive(200, 200), "not_armed")
-            self.assertIsInstance(told.__cause__, Refused)
+            raised = self.ended(lambda: wheels.drive(200, 200), "not_armed")
+            self.assertIsInstance(raised.__cause__, Refused)
             seen = [event.get("change", event.get("cause")) for event in gateway.events(timeout=0.3)]
             self.assertEqual(seen, ["gained", "lease_lost", "lost"])
 
-    def test_after_a_lost_lease_a_new_permission_is_had_at_once(self):
+    def test_new_permission_after_lost_lease_is_granted_immediately(self):
         with Gateway(self.socket) as gateway:
             wheels = self.lose(gateway)
             self.ended(lambda: wheels.twist(200, 0), "not_armed")
             with gateway.arm() as again:
                 again.drive_for(0.2, 100, 100)
 
-    def test_drive_for_tells_it_too(self):
+    def test_drive_for_reports_a_lost_lease(self):
         with Gateway(self.socket) as gateway:
             wheels = self.lose(gateway)
             self.ended(lambda: wheels.drive_for(1, 200, 200), "not_armed")
 
-    def test_an_estop_is_told_with_its_reason(self):
+    def test_estop_is_reported_with_its_reason(self):
         with Gateway(self.socket) as gateway, Gateway(self.socket) as other, gateway.arm() as wheels:
             wheels.drive(200, 200)
             other.estop("a child runs by")
-            told = self.ended(lambda: wheels.drive(200, 200), "latched")
-            self.assertIn("a child runs by", str(told))
+            raised = self.ended(lambda: wheels.drive(200, 200), "latched")
+            self.assertIn("a child runs by", str(raised))
 
-    def test_somebody_else_who_drives_now_is_told_and_left_alone(self):
+    def test_new_driver_is_reported_and_not_disturbed(self):
         with Gateway(self.socket) as gateway, Gateway(self.socket) as other:
             wheels = gateway.arm()
             mine = other.arm("second", takeover=True)
@@ -354,7 +354,7 @@ class Ending(RigCase):
             self.assertIn("second", str(self.ended(lambda: wheels.drive(0, 0), None)))
             mine.drive(0, 0)
 
-    def test_a_connection_whose_end_is_still_unread_is_an_ended_lease(self):
+    def test_connection_end_not_yet_read_counts_as_ended_lease(self):
         with Gateway(self.socket) as gateway:
             wheels = gateway.arm()
             wheels.drive(100, 100)
@@ -363,8 +363,8 @@ class Ending(RigCase):
             self.ended(lambda: wheels.drive(100, 100), None)
 
 
-class Telling(RigCase):
-    """drive_for with on_status."""
+class OnStatus(RigCase):
+    """Tests of drive_for with on_status."""
 
     def test_every_command_is_followed_by_a_snapshot(self):
         seen = []
@@ -389,7 +389,7 @@ class Telling(RigCase):
         self.assertLess(time.monotonic() - begin, 4)
         self.assert_stood_by(now_us(), 0)
 
-    def test_what_it_raises_stops_the_wheels(self):
+    def test_exception_in_on_status_stops_the_wheels(self):
         def stumble(status):
             if status["left"]["speed_mm_s"] > 100:
                 raise ZeroDivisionError
@@ -415,9 +415,9 @@ class Telling(RigCase):
 
 
 class Answers(RigCase):
-    """What the gateway replies is handed out."""
+    """The gateway's replies are returned."""
 
-    def test_tare_tells_the_new_zero_and_the_one_before(self):
+    def test_tare_returns_the_new_zero_and_the_previous_one(self):
         with Gateway(self.socket) as gateway:
             self.wait_until(lambda: self.granted(gateway.tare), 6)
             tared = gateway.tare("left")
@@ -433,7 +433,7 @@ class Answers(RigCase):
         except Refused:
             return None
 
-    def test_confirm_tells_what_is_known_of_the_item(self):
+    def test_confirm_returns_the_assumption_of_the_item(self):
         with Gateway(self.socket) as gateway:
             entry = gateway.confirm("wheel_radius", 200.0)
             self.assertEqual((entry["state"], entry["found"]), ("contradicted", "200"))
@@ -452,7 +452,7 @@ class Answers(RigCase):
             with self.assertRaises(ValueError):
                 gateway.config("drive.lease_ms", 300.5)
 
-    def test_watch_tells_what_was_granted_and_stops_tell_the_state(self):
+    def test_watch_returns_the_grant_and_stops_return_the_state(self):
         with Gateway(self.socket) as gateway:
             self.assertEqual(gateway.watch("state", rate_hz=500), {"topics": ["state"], "rate_hz": 100, "limited": True})
             gateway.watch()
@@ -467,7 +467,7 @@ class Answers(RigCase):
 
 
 class Reconnecting(RigCase):
-    def test_a_gateway_that_was_killed_is_found_again_and_nothing_moves(self):
+    def test_gateway_killed_is_reconnected_and_nothing_moves(self):
         with Gateway(self.socket, wait=5) as gateway:
             with warnings.catch_warnings(record=True):
                 warnings.simplefilter("always")
@@ -499,7 +499,7 @@ class Reconnecting(RigCase):
                     break
             self.assertEqual([name for name in seen if name != "state"], ["disconnected", "reconnected"])
 
-    def test_who_does_not_read_events_is_told_how_many_were_lost(self):
+    def test_unread_events_are_counted_as_lost(self):
         with Gateway(self.socket) as gateway:
             gateway.watch("frame")
             time.sleep(4.0)
@@ -514,12 +514,12 @@ class Reconnecting(RigCase):
 
 
 class Reading(RigCase):
-    def test_what_is_not_known_is_none(self):
+    def test_unknown_values_are_none(self):
         with Gateway(self.socket) as gateway:
             self.assertIsNone(gateway.status()["left"]["commanded_mm_s"])
             self.assertEqual(gateway.why()["number"], 0)
 
-    def test_two_threads_in_one_gateway_are_told(self):
+    def test_two_threads_in_one_gateway_are_reported(self):
         with Gateway(self.socket) as gateway:
             gateway.watch("stop")
             watcher = threading.Thread(target=lambda: list(gateway.events(timeout=0.5)))

@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Adds up single tests in CTest's JUnit files.
+"""Sums up the single tests in CTest's JUnit files.
 
-usage: count_tests.py --run FILE COMMAND...    runs CTest, which writes FILE, and sums up
-       count_tests.py FILE                     the sum of ./check, of what test/all/start said: by layer; what was skipped and what failed, by name
+usage: count_tests.py --run FILE COMMAND...    runs CTest, which writes FILE, and prints the sum
+       count_tests.py FILE                     prints the sum of ./check from the output of test/all/start: by layer, then each skipped and each failed test
 
-A program that sums up in the words of our runners ("12 passed, 0 failed, 0 skipped"), of Unity ("12 Tests 0 Failures 0 Ignored") or of Python's unittest
-("Ran 12 tests in 1.5s") counts as that many tests; any other as one. A program that failed counts at least one failure, whatever it said, unless it says
-that it was not judged (test/support/verdict.py). Last line: "N passed, N failed, N skipped". Exit status 1 if one failed or none passed, 75 if one was not judged.
+A program counts as several tests if it prints a sum as our runners do ("12 passed, 0 failed, 0 skipped"), as Unity ("12 Tests 0 Failures 0 Ignored") or as Python's
+unittest ("Ran 12 tests in 1.5s"); any other counts as one. A failed program counts at least one failure, whatever it prints, unless it prints that it was not judged
+(test/support/verdict.py). The last line is "N passed, N failed, N skipped". Exit status: 1 if a test failed or none passed, 75 if one was not judged.
 """
 
 import collections
@@ -22,12 +22,12 @@ OURS = re.compile(r"^(\d+) passed, (\d+) failed(?:, (\d+) skipped)?$", re.MULTIL
 NOT_JUDGED = re.compile(r"^real time not judged: .*\n\d+ passed, 0 failed, \d+ skipped$", re.MULTILINE)
 INCONCLUSIVE = re.compile(r"^(\d+) inconclusive", re.MULTILINE)
 PYTHON = re.compile(r"^Ran (\d+) tests? in .*\n\n(?:OK|FAILED)(.*)$", re.MULTILINE)
-REASON = re.compile(r"\d+: (E  |FAILED)")  # As `start` shows a line of pytest's.
+REASON = re.compile(r"\d+: (E  |FAILED)")  # A line of pytest in the output of `start`.
 STARTED = re.compile(r"^layer=(\S+) status=(\d+) inconclusive=(\d+) processor_s=([\d.]+)$", re.MULTILINE)
 
 
 def count(output, status):
-    """(passed, failed, skipped) of what a program said that ended with this status."""
+    """(passed, failed, skipped) of a program with this output and exit status."""
     passed, failed, skipped = int(status == 0), 0, int(status == 77)
     if OURS.search(output):
         passed, failed, skipped = (int(number or 0) for number in OURS.findall(output)[-1])
@@ -44,7 +44,7 @@ def count(output, status):
 
 
 def cases_of(path):
-    """(name, what it said, status, seconds): 77 if it did not run, 75 if it says that it was not judged."""
+    """(name, output, status, seconds) of each test; status 77: it did not run, 75: it reports that it was not judged."""
     for case in xml.etree.ElementTree.parse(path).getroot().iter("testcase"):
         output, skipped = case.findtext("system-out") or "", case.get("status") == "notrun" or case.find("skipped") is not None
         failed = 75 if NOT_JUDGED.search(output) else 1
@@ -71,19 +71,19 @@ def main(path):
         sums, inconclusive = [total + one for total, one in zip(sums, counts, strict=True)], inconclusive + int(late)
         layers[layer] = [total + one for total, one in zip(layers[layer], (sum(counts), float(processor_s), wall_s), strict=True)]
         if counts[1]:
-            failed.append(f"failed: {name}: {counts[1]} of {sum(counts)}; all of it: {log}")
+            failed.append(f"failed: {name}: {counts[1]} of {sum(counts)}; log: {log}")
             failed += [f"  {line}" for line in output.splitlines() if REASON.match(line)][:12]
             if layer == "none":
-                failed += ["  did not end by itself; it said last:", *(log.read_text(errors="replace").splitlines()[-25:] if log.exists() else [])]
+                failed += ["  did not end on its own; its last output:", *(log.read_text(errors="replace").splitlines()[-25:] if log.exists() else [])]
         elif counts[2]:
-            why = [line.strip() for line in output.splitlines() if re.match(r" *skip", line, re.IGNORECASE)] or ["not run: what it needs failed"]
+            why = [line.strip() for line in output.splitlines() if re.match(r" *skip", line, re.IGNORECASE)] or ["not run: a prerequisite failed"]
             skipped += [f"skipped: {name}: {re.sub('(?i)^skip(ped)?[: ]*', '', line)}" for line in why]
         unjudged += [name] if int(ended) == 75 and not counts[1] else []
     layers["all"] = [sum(column) for column in zip(*layers.values(), strict=True)]
     print(f"\n{'layer':12} {'single tests':>12} {'processor s':>12} {'wall s':>8}")
     print(*("{:12} {:12d} {:12.0f} {:8.0f}".format(layer, *numbers) for layer, numbers in layers.items()), *skipped, *failed, sep="\n")
     print(f"{inconclusive} inconclusive, counted as skipped: the machine stalled; their names are above\n" if inconclusive else "", end="")
-    print(f"real time not judged: {' '.join(unjudged)}; try them on a machine that does less\n" if unjudged else "", end="")
+    print(f"real time not judged: {' '.join(unjudged)}; repeat them on a machine with less load\n" if unjudged else "", end="")
     print("{} passed, {} failed, {} skipped".format(*sums))
     return 1 if sums[1] else 75 if unjudged else int(not sums[0])
 

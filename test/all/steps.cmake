@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: MIT
-# The tests of ./check in the order of their steps, one line each: see CMakeLists.txt. What a step proves: docs/developer/proofs.csv.
+# The tests of ./check in the order of their steps, one line each; CMakeLists.txt explains the columns. docs/developer/proofs.csv says what each step proves.
 set(B build/default)
 set(first 1)
 if(HOURS GREATER 0)
-    string(TIMESTAMP first "%s") # Seeds that no campaign began with.
+    string(TIMESTAMP first "%s") # Seeds that no earlier campaign used.
     set(full --full)
 endif()
 math(EXPR second "${first} + 10000000")
 set(names sim_hours daemon_hours kills ros2_hours fuzz_seconds)
 set(usual 300 4 1000 0.15 3)
-set(each_hour 750 125 5000 3 180) # With --full --hours N.
+set(each_hour 750 125 5000 3 180) # For --full --hours N.
 foreach(name value more IN ZIP_LISTS names usual each_hour)
     set(${name} ${value})
     if(HOURS GREATER 0)
@@ -21,11 +21,11 @@ tests(unit quick unit default 40 -LE "^bench$")
 tests(unit.programs check realtime default 2 -L "^bench$")
 test(real unit.client check realtime default py:pytest 20 ${PYTEST} test/client --build ${B})
 build(clang check clang clang 46)
-# The bridges too, as they are: what a sanitizer finds ends the program. What their tests say of memory and latency is not asked here.
+# The bridges run too: any finding of a sanitizer ends the program. Their tests of memory and latency are left out here.
 set(S build/sanitize)
 build(sanitize.build ci sanitize "" 103)
 tests(sanitize ci unit sanitize 40)
-# Natively: no sanitizer works in the kernel of the tests. As many at a time as there are processors; more of them stall each other.
+# These run natively: no sanitizer works in the kernel of the tests. More processes than processors would stall each other.
 test(real sanitize.ctl ci realtime sanitize py:pytest 400 ${PYTEST} test/ctl --build ${S} --jobs ${JOBS})
 test(real sanitize.client ci realtime sanitize py:pytest 22 ${PYTEST} test/client --build ${S})
 test(real sanitize.web ci realtime sanitize "${S}/app/bridge/web/iwheel-web py:pytest" 60 ${PYTEST} test/web --build ${S} -k "token_missing or token_over or paths or with_a_body or leave_room or unix_socket or killed_is or page_drives or slow_conn")
@@ -36,7 +36,7 @@ test(real sanitize.mqtt ci realtime sanitize "${S}/app/bridge/mqtt/iwheel-mqtt p
 build(coverage.build check coverage "" 40)
 test(idle coverage check unit coverage py:gcovr 35 sh -c "find build/coverage -name '*.gcda' -delete && ctest --preset coverage -L unit --no-tests=error -j ${JOBS} && .venv/bin/gcovr build/coverage/core")
 build(mcdc.build ci mcdc "clang-19 llvm-cov-19 llvm-profdata-19" 40 iwheel_unit_tests)
-# Every condition of the core decides alone. Of a header that several files include, llvm-cov counts the files together.
+# Every condition of the core must decide alone. llvm-cov counts all sources that include a header together.
 set(conditions "-instr-profile build/mcdc/all.profdata \$(find build/mcdc -name 'unit_*' -type f -perm -u+x | sort | sed '2,$ s/^/-object /') core")
 set(conditions "llvm-profdata-19 merge -sparse build/mcdc/profiles/*.profraw -o build/mcdc/all.profdata && llvm-cov-19 report -show-mcdc-summary -show-region-summary=false -show-branch-summary=false ${conditions} | tee build/mcdc/conditions && awk '/^TOTAL/ {all = (\$NF == \"100.00%\")} END {exit !all}' build/mcdc/conditions || (llvm-cov-19 show -show-mcdc ${conditions} | grep -B12 'Pair: not covered' && false)")
 test(idle mcdc ci unit mcdc "clang-19 llvm-cov-19 llvm-profdata-19" 20 sh -c "rm -rf build/mcdc/profiles && LLVM_PROFILE_FILE=${ROOT}/build/mcdc/profiles/%m.profraw ctest --preset mcdc -L unit --no-tests=error -j ${JOBS} && ${conditions}")
@@ -53,14 +53,14 @@ test(idle stack.linux check lint default "" 12 scripts/stack_usage.py --frames $
 test(idle size check target "arm;arm-m3;arm-m0plus" arm-none-eabi-gcc 18 sh -c "test/target/build_images && scripts/sizes.py \${IWHEEL_SIZES:---check} build/arm-m0plus build/arm-m3 build/arm")
 test(real bench check realtime default "" 76 test/bench/run --check)
 build(analyzer check analyzer "" 40)
-# One file only tests compile: the Linux port for libgpiod 2.
+# Only tests compile this file: the Linux port for libgpiod 2.
 test(idle analyzer.gpio_v2 check lint analyzer "" 5 sh -c "cmake --preset analyzer -DBUILD_TESTING=ON && (test ! -d build/analyzer/test/unit/CMakeFiles/unit_linux_gpio_v2.dir || cmake --build --preset analyzer --target unit_linux_gpio_v2)")
 set(analyze "cmake --build --preset arm-analyzer -j ${JOBS} && cmake --preset arm-analyzer -DIWHEEL_SETPOINT_TYPE=1 -DIWHEEL_CURRENT_ROLE=limit -DIWHEEL_TRACK_MM=540")
 test(idle analyzer.arm check lint "" arm-none-eabi-gcc 30 sh -c "cmake --preset arm-analyzer '-UIWHEEL_[B-Z]*' && ${analyze} -DIWHEEL_DEMO=ON && ${analyze} -DIWHEEL_DEMO=OFF -DIWHEEL_GATEWAY=ON && cmake --build --preset arm-analyzer -j ${JOBS}")
 test(idle eva check formal "" "" 48 test/eva/run)
-test(idle wp check+full formal "" "" 267 test/wp/run --plant $<IF:$<BOOL:${HOURS}>,all,few>)
+test(idle wp check+full formal "" "" 267 test/wp/run --faults $<IF:$<BOOL:${HOURS}>,all,few>)
 test(idle tidy ci lint clang "run-clang-tidy clang-tidy clang" 220 sh -c "grep -q '${ROOT}/core/src/step.c' build/clang/compile_commands.json && run-clang-tidy -quiet -p build/clang -j ${JOBS} '^${ROOT}/(core/src|port/linux|lib|app)/'")
-# Each version of the addon finds and overlooks other things. Without its file `tidy` would pass.
+# Each version of the addon finds other things. Without the addon's file `tidy` would pass.
 test(idle cppcheck check lint "" cppcheck 6 sh -c "(cppcheck --version | grep -x 'Cppcheck 2.10' || (echo 'skip: the suppressions are written for cppcheck 2.10' && exit 77)) && xargs -a .cppcheck cppcheck core/src/*.c")
 test(idle deviations quick lint "" "" 1 scripts/deviations.py)
 test(idle style.code quick lint "" py:lizard 5 ${PY} scripts/style.py)
@@ -75,7 +75,7 @@ test(idle house check lint "default;arm" "" 12 scripts/house.py facts)
 test(idle house.layers check lint "" "" 2 scripts/house.py layers)
 test(idle house.pages quick lint "" "" 1 scripts/house.py pages)
 test(idle house.pins check lint "" py:pip 2 ${PY} scripts/house.py pins)
-# Without "/// @file" at its head Doxygen leaves out a header's functions and macros without a warning.
+# Doxygen omits the functions and macros of a header without "/// @file" at its head, and prints no warning.
 test(idle api check lint "" doxygen 2 sh -c "headers=\$(sed -n 's/^INPUT *= *//p' docs/developer/Doxyfile) && ! grep -rL --include=*.h --include=*.hpp '^/// @file$' \$headers | grep . && mkdir -p build/api && IWHEEL_VERSION=\$(scripts/version) doxygen docs/developer/Doxyfile")
 test(idle gates ci faults "default;arm" py:pytest 154 ${PYTEST} test/gates --jobs ${JOBS})
 test(idle target ci+full target default "py:pytest py:unicorn" 189 ${PYTEST} test/target --build ${B} --jobs ${JOBS})
@@ -98,7 +98,7 @@ test(real verdicts.pytest check faults "" py:pytest 60 ${PY} test/support/test_p
 test(real system check+full realtime default py:pytest 131 ${PYTEST} test/system --build ${B} --jobs 4)
 test(idle ros2.hours check+full safety default ${B}/app/bridge/ros2/iwheel-ros2 10 ${B}/test/ros2/ros2_hours ${ros2_hours})
 test(real ros2 check+full realtime default "${B}/app/bridge/ros2/iwheel-ros2 py:cyclonedds py:rosbags py:pytest" 46 ${PYTEST} test/ros2 --build ${B} --jobs 4 --ignore test/ros2/test_typed.py)
-# Programs that nobody here wrote. Without ROS 2 Jazzy, which ./check installs, its scenarios are skipped.
+# Programs by other authors. Without ROS 2 Jazzy, which ./check installs, these scenarios are skipped.
 test(real ros2.typed check+full foreign default "${B}/app/bridge/ros2/iwheel-ros2 py:cyclonedds py:rosbags py:pytest" 90 ${PYTEST} test/ros2/test_typed.py --build ${B} --jobs 2)
 test(real ros2.kilted ci foreign default "${B}/app/bridge/ros2/iwheel-ros2 py:cyclonedds py:rosbags py:pytest" 60 env IWHEEL_ROS=build/ros-kilted ${PYTEST} test/ros2/test_typed.py --build ${B} --jobs 2 -k "graph_fastrtps or services_fastrtps or publishers or drive")
 test(idle mqtt.hours check+full safety default ${B}/app/bridge/mqtt/iwheel-mqtt 10 ${B}/test/mqtt/mqtt_hours)
@@ -124,12 +124,12 @@ test(real upgrade ci packaging "debian.packages;upgrade.packages" py:pytest 24 $
 test(idle package check packaging default "" 28 test/package/run ${B})
 test(idle python.words check lint "" "" 1 scripts/northbound.py --check)
 test(idle python.description check lint "" "" 1 python3 test/northbound/test_description.py)
-# Installed from a copy: setuptools writes beside the sources.
+# pip installs from a copy: setuptools writes into the source folder.
 test(idle python.install check packaging "" py:pip 8 sh -c "rm -rf build/python && mkdir -p build/python && cp -r python/src python/pyproject.toml python/README.md build/python && .venv/bin/pip install --quiet --disable-pip-version-check --no-deps --no-index --no-build-isolation --target build/python/site ./build/python && cd / && PYTHONPATH=${ROOT}/build/python/site ${ROOT}/.venv/bin/python -c 'import iwheel'")
 test(idle python.types check lint "" py:mypy 10 sh -c "cd python && ../.venv/bin/mypy")
 test(real python check realtime default py:pytest 60 ${PYTEST} python/tests --build ${B} --jobs 3)
 test(real ctl check realtime default py:pytest 150 ${PYTEST} test/ctl --build ${B} --jobs 4 --ignore test/ctl/test_bringup.py)
 test(idle ctl.bringup check scenario "default;kernel.build" py:pytest 40 ${PYTEST} test/ctl/test_bringup.py --build ${B} --virtual --jobs ${JOBS})
 test(real captures check realtime default "" 22 python3 test/ctl/captures --build ${B} --check)
-# It ends well where it could not judge the timing; here that is no success.
+# The demo exits with 0 even if it could not judge the timing; here that is no success.
 test(real demo check realtime "" "" 40 python3 test/support/verdict.py --run demo bash -o pipefail -c "./demo </dev/null 2>&1 | tee build/check/demo.said && ! grep -q 'Timing was not judged' build/check/demo.said")

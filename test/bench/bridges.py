@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Instructions of the bridges in a second, next to a gateway at 617 frames/s (callgrind).
+"""Instructions of the bridges per second, next to a gateway at 617 frames/s (callgrind).
 
 iwheel-web has no client and iwheel-ros2 no reader; iwheel-mqtt sends every state to a broker. The figures vary by a few per cent with the number of lines
 that arrive together, so they are compared with limits.
@@ -18,7 +18,7 @@ from free_domain import free_domain
 
 START_S = 30
 SETTLE_S = 7.0  # iwheel-web keeps its full rate for 5 s after it has connected.
-# Instructions in a second: the measured figures (200 000 to 270 000, 1 740 000, 16 600 000) and a fifth more.
+# Instructions per second: the measured figures (200 000 to 270 000, 1 740 000, 16 600 000) plus a fifth.
 LIMITS = {"iwheel-web, no client": 320000, "iwheel-mqtt, a state every 100 ms": 2200000, "iwheel-ros2, odometry at 50 Hz": 20000000}
 PROGRAMS = {"iwheel-web": "web", "iwheel-mqtt": "mqtt", "iwheel-ros2": "ros2"}
 
@@ -30,7 +30,7 @@ def free_port():
 
 
 def broker(folder):
-    """A mosquitto of our own; its port."""
+    """Starts a mosquitto and returns its port."""
     port = free_port()
     (folder / "mosquitto.conf").write_text(f"listener {port} 127.0.0.1\nallow_anonymous true\n")
     return port, subprocess.Popen(["mosquitto", "-c", folder / "mosquitto.conf"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
@@ -55,9 +55,9 @@ def await_words(path, words):
 
 
 def count(build, name, pair, folder):
-    """Instructions of the bridge in a second."""
+    """Instructions of the bridge per second."""
     folder.mkdir()
-    port, servant = broker(folder) if name == "iwheel-mqtt" else (0, None)
+    port, mosquitto = broker(folder) if name == "iwheel-mqtt" else (0, None)
     (folder / "bridge.conf").write_text(settings(build, name, pair, folder, port))
     out = folder / "out"
     under = ["valgrind", "--tool=callgrind", f"--callgrind-out-file={folder}/callgrind.out"]
@@ -68,14 +68,14 @@ def count(build, name, pair, folder):
         time.sleep(SETTLE_S)
         return loop.instructions(bridge.pid, folder)
     finally:
-        for process in (bridge, servant):
+        for process in (bridge, mosquitto):
             if process:
                 process.send_signal(signal.SIGTERM)
                 process.wait(20)
 
 
 def rows(build, pair_type):
-    """(what, instructions in a second or None where a program is missing)"""
+    """(bridge, instructions per second, or None if a program is missing)"""
     with tempfile.TemporaryDirectory(prefix="iwheel-bench-", ignore_cleanup_errors=True) as name:
         folder = Path(name)
         (folder / "pair").mkdir()

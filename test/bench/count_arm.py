@@ -12,14 +12,14 @@ from unicorn import arm_const as arm
 BASE = 0x10000
 MEMORY = 0x40000
 STACK = BASE + MEMORY - 16
-HOME = BASE + MEMORY - 4  # Where the outermost function returns to.
+RETURN_ADDRESS = BASE + MEMORY - 4  # Return address of the outermost function.
 MODELS = {"cortex-m0plus": arm.UC_CPU_ARM_CORTEX_M0, "cortex-m4": arm.UC_CPU_ARM_CORTEX_M4}
 FLAGS = ["-mthumb", "-mfloat-abi=soft", "-Os", "-std=c99", "-ffunction-sections", "-fdata-sections", "-fno-common"]
-FREESTANDING = ("-ffreestanding",)  # As the core is built.
+FREESTANDING = ("-ffreestanding",)  # The options of the core.
 
 
 def compile_clang(out, cpu, sources, includes, more):
-    """Objects by clang, with the C library's headers of the GNU compiler."""
+    """Builds objects with clang and the C library's headers of the GNU compiler."""
     system = subprocess.run(["arm-none-eabi-gcc", "-print-sysroot"], capture_output=True, text=True, check=True).stdout.strip()
     objects = []
     for source in map(Path, sources):
@@ -45,8 +45,8 @@ def compile_clang(out, cpu, sources, includes, more):
 
 
 def build(out, cpu, sources, includes, entries, more=FREESTANDING, compiler="gcc"):
-    """Links a program without start-up code; `entries` are kept."""
-    keep = [f"-Wl,-u,{entry}" for entry in entries]
+    """Links a program without start-up code; `entries` are retained."""
+    retain = [f"-Wl,-u,{entry}" for entry in entries]
     if compiler == "clang":
         sources = compile_clang(out, cpu, sources, includes, more)
     command = [
@@ -62,7 +62,7 @@ def build(out, cpu, sources, includes, entries, more=FREESTANDING, compiler="gcc
         "-Wl,-N",
         "-Wl,--gc-sections",
         f"-Wl,-e,{entries[0]}",
-        *keep,
+        *retain,
         "-o",
         str(out),
     ]
@@ -73,7 +73,7 @@ def build(out, cpu, sources, includes, entries, more=FREESTANDING, compiler="gcc
 
 
 def text_size(elf, prefixes=("iw_", "read_", "bench_linked_", "left_ids", "lengths", "iwheel_")):
-    """Bytes of code and constants of the linked functions whose names begin so."""
+    """Bytes of code and constants of the linked functions whose names begin with this."""
     run = subprocess.run(["arm-none-eabi-nm", "-S", str(elf)], capture_output=True, text=True, check=True)
     rows = [line.split() for line in run.stdout.splitlines()]
     return sum(int(row[1], 16) for row in rows if len(row) == 4 and row[2] in "tTrR" and row[3].startswith(prefixes))
@@ -99,16 +99,16 @@ class Program:
         self.at[address] += 1
 
     def call(self, name, argument=0):
-        """(what it returned, how many instructions it took)"""
+        """(its result, the number of instructions)"""
         self.cpu.reg_write(arm.UC_ARM_REG_SP, STACK)
         self.cpu.reg_write(arm.UC_ARM_REG_R0, argument)
-        self.cpu.reg_write(arm.UC_ARM_REG_LR, HOME | 1)
+        self.cpu.reg_write(arm.UC_ARM_REG_LR, RETURN_ADDRESS | 1)
         before = self.executed
-        self.cpu.emu_start(self.address[name] | 1, HOME)
+        self.cpu.emu_start(self.address[name] | 1, RETURN_ADDRESS)
         return self.cpu.reg_read(arm.UC_ARM_REG_R0), self.executed - before
 
     def profile(self, name):
-        """{function: instructions of its own} of one call."""
+        """{function: its own instructions} of one call."""
         self.at.clear()
         self.call(name)
         own = Counter()

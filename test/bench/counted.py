@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What can be counted rather than timed: instructions and bytes. The same on every machine with the same compiler."""
+"""Figures that are counted and not timed: instructions and bytes. They are the same on every machine with the same compiler."""
 
 import collections
 import re
@@ -28,7 +28,7 @@ PROFILE_FROM = 40  # instructions of a function in a step
 
 
 def codecs(work):
-    """{name: (sources, include folders)}; cantools' C source is made here, from the DBC file."""
+    """{name: (sources, include folders)}; cantools' C source is generated here from the DBC file."""
     generated = work / "cantools"
     generated.mkdir(parents=True, exist_ok=True)
     subprocess.run(
@@ -53,7 +53,7 @@ def host_instructions(program, *arguments):
 
 
 def host_codec(work, name, sources, includes, compiler):
-    """Instructions per frame on this machine: (decode, encode). The difference of two runs, so without start and end."""
+    """Instructions per frame on this machine: (decode, encode). The difference of two runs excludes start and end."""
     program = work / f"codec-{name}-{compiler}"
     subprocess.run(
         [
@@ -78,7 +78,7 @@ def host_codec(work, name, sources, includes, compiler):
 
 
 def arm_codec(work, name, cpu, sources, includes, compiler):
-    """cantools' user has a C library, whose memset is not turned into a loop of bytes."""
+    """cantools' user has a C library whose memset is not compiled into a loop of bytes."""
     more = () if name == "cantools" else count_arm.FREESTANDING
     elf = count_arm.build(
         work / f"codec-{name}-{cpu}-{compiler}.elf",
@@ -124,7 +124,7 @@ def driving(work, cpu, more=()):
 
 
 def arm_profile(work, cpu):
-    """Rows of (function, instructions of its own with nothing due, the same with a pair due), the costliest first, and the rest in one row."""
+    """Rows of (function, its own instructions with nothing due, the same with a pair due), the most expensive first, and the rest in one row."""
     program = driving(work, cpu)
     idle, pair = program.profile("bench_idle"), program.profile("bench_pair")
     shown = sorted({name for name, count in [*idle.items(), *pair.items()] if count >= PROFILE_FROM}, key=lambda name: (-idle[name], -pair[name]))
@@ -132,7 +132,7 @@ def arm_profile(work, cpu):
     return [*[(name, idle[name], pair[name]) for name in shown], ("all others together", *rest)]
 
 
-# What each source of the core is there for; one that is not named here stands under its own name.
+# The purpose of each source of the core; a source that is not listed appears under its own name.
 RULES = {
     "setpoint": "R1, R4: ramps, periods, the zero hold",
     "envelope": "R8: the last check",
@@ -163,7 +163,7 @@ def sources_of_core():
 
 
 def arm_rules(work, cpu):
-    """Rows of (rule, instructions with nothing due, the same with a pair due), the costliest first."""
+    """Rows of (rule, instructions with nothing due, the same with a pair due), the most expensive first."""
     program, source = driving(work, cpu), sources_of_core()
     costs = collections.defaultdict(lambda: [0, 0])
     for column, profile in enumerate((program.profile("bench_idle"), program.profile("bench_pair"))):
@@ -174,32 +174,32 @@ def arm_rules(work, cpu):
 
 
 def arm_steps(work, cpu, more=()):
-    """{what is done in one step: instructions}, with more flags of the compiler."""
+    """{work of one step: instructions}, with additional options of the compiler."""
     program = driving(work, cpu, more)
     idle_sent, idle = program.call("bench_idle")
     received, frame = program.call("bench_frame_in")
-    look = sum(count for name, count in program.profile("bench_look").items() if name != "bench_look")
+    observe = sum(count for name, count in program.profile("bench_look").items() if name != "bench_look")
     seen, _ = program.call("bench_seen")
     pair_sent, pair = program.call("bench_pair")
     faster, _ = program.call("bench_faster")
     ramp_sent, ramp = program.call("bench_pair")
     did = (idle_sent, received, seen, pair_sent, faster, ramp_sent)
     if did != (0, 1, 1, 1, 1, 1):
-        raise SystemExit(f"the steps of test/bench/step did something else: {did}")
-    return {"nothing due": idle, "a frame in": frame, "a pair due": pair, "a pair due, of a ramp": ramp, "a look at everything": look}
+        raise SystemExit(f"the steps of test/bench/step did other work: {did}")
+    return {"nothing due": idle, "a frame in": frame, "a pair due": pair, "a pair due, of a ramp": ramp, "a look at everything": observe}
 
 
 def status_events(build):
-    """{what of it is kept: instructions of one event `state` on this machine}, of the gateway as it was built there."""
+    """{which part is cached: instructions of one event `state` on this machine}, for the gateway of that build."""
     program, few, many = Path(build) / "test/bench_status", 20, 120
-    return {what: round((host_instructions(program, what, many) - host_instructions(program, what, few)) / (many - few)) for what in ("kept", "anew")}
+    return {what: round((host_instructions(program, what, many) - host_instructions(program, what, few)) / (many - few)) for what in ("same", "changed")}
 
 
 def client_reads(work, build, *fields):
     """Instructions of libiwheel-client from the socket to one event `state`, or to its fields, system calls not counted."""
     line = work / "state.jsonl"
-    told = subprocess.run([Path(build) / "test/bench_status", "line"], capture_output=True, check=True).stdout
-    line.write_bytes(next(row for row in told.splitlines(keepends=True) if row.startswith(b'{"event":"state"')))
+    output = subprocess.run([Path(build) / "test/bench_status", "line"], capture_output=True, check=True).stdout
+    line.write_bytes(next(row for row in output.splitlines(keepends=True) if row.startswith(b'{"event":"state"')))
     program, few, many = Path(build) / "test/bench_client", 20, 120
     return round((host_instructions(program, line, many, *fields) - host_instructions(program, line, few, *fields)) / (many - few))
 
@@ -216,14 +216,14 @@ def decode_writes(work, build, form):
 
 
 def read_lines(work, build):
-    """Rows of (what, instructions for a line, limit)."""
+    """Rows of (work, instructions per line, limit)."""
     figures = {"libiwheel-client, an event `state`": client_reads(work, build), "the same, and its fields": client_reads(work, build, "fields")}
     figures |= {f"iwheelctl {form}": decode_writes(work, build, form) for form in ("decode", "decode --csv", "--json decode")}
     return [[what, str(figure), f"≤ {READ_LIMITS[what]}"] for what, figure in figures.items()]
 
 
 def everything(work, compiler):
-    """Rows of (codec, {what is counted: instructions per frame, without those of the loop around it})."""
+    """Rows of (codec, {count: instructions per frame, without those of the loop around it})."""
     rows, loop = [], {}
     for name, (sources, includes) in codecs(work).items():
         figures = dict(zip(("x86-64 decode", "x86-64 encode"), host_codec(work, name, sources, includes, compiler), strict=True))

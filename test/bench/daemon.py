@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The gateway as a process, over the local bus: system calls for a frame, memory, threads, allocations, and how soon it is back after a kill.
+"""The gateway as a process, over the local bus: system calls per frame, memory, threads, allocations, and the time until it is back after a kill.
 
-Figures of this machine at this moment, so they are shown and not checked; the counts (threads, allocations) do not depend on the load.
+Figures of this machine at this moment, so they are printed and not checked; the counts (threads, allocations) do not depend on the load.
 """
 
 import grp
@@ -56,12 +56,12 @@ class Client:
         self.socket.close()
 
 
-# A gateway that is traced or counted is late now and then; that is no reason to stop here.
+# A traced gateway is late now and then; it need not stop for that here.
 TRACED = "[limits]\nwheel_silent_ms = 200\necho_ms = 200\n[drive]\nlease_ms = 500\nmax_speed_mm_s = 700\n"
 
 
 class Pair:
-    """A simulator and a gateway in a folder of their own."""
+    """A simulator and a gateway in a separate folder."""
 
     def __init__(self, build, folder, under=()):
         self.folder, self.under = Path(folder), under
@@ -88,7 +88,7 @@ class Pair:
                 f"{self.folder}/control",
             ]
         )
-        for name in ("bus", "estop"):  # A gateway that starts without its e-stop is latched.
+        for name in ("bus", "estop"):  # A gateway that starts without its e-stop latches.
             self.await_file(name)
         self.gateway = self.start()
 
@@ -135,7 +135,7 @@ def received(client):
 
 
 def calls_per_frame(pair):
-    """System calls of the gateway for each telemetry frame, with nobody connected; None without strace's rights."""
+    """System calls of the gateway per telemetry frame, without a client; None without the permission for strace."""
     if shutil.which("strace") is None:
         return None
     client = Client(pair.northbound)
@@ -156,13 +156,13 @@ def kilobytes(pid, what):
 
 
 def family(pid):
-    """The process and those that it has started."""
+    """The process and its children."""
     children = " ".join(path.read_text() for path in Path(f"/proc/{pid}/task").glob("*/children")).split()
     return [pid, *(one for child in children for one in family(int(child)))]
 
 
 def together(pid):
-    """(processes, kB of memory of all of them, what they share counted once: PSS)"""
+    """(processes, kB of memory of all of them, shared memory counted once: PSS)"""
     all_of_it = family(pid)
     return len(all_of_it), sum(int(re.search(r"^Pss:\s+(\d+) kB", Path(f"/proc/{one}/smaps_rollup").read_text(), re.MULTILINE)[1]) for one in all_of_it)
 
@@ -188,7 +188,7 @@ def allocations_in_use(pair):
 
 
 def back_after_kill(pair):
-    """Seconds from SIGKILL to the first answer, with a supervisor that restarts at once."""
+    """Seconds from SIGKILL to the first reply, with a supervisor that restarts immediately."""
     killed = time.monotonic()
     pair.gateway.kill()
     pair.gateway.wait()
@@ -215,7 +215,7 @@ def measure(build):
             threads = len(list(Path(f"/proc/{pair.gateway.pid}/task").iterdir()))
             host.be_prompt()
             host.build_tools(Path(folder))
-            beside = [*local.rows(local.measure(pair, Client, folder)), *growth.rows(growth.measure(pair, Client))]
+            more = [*local.rows(local.measure(pair, Client, folder)), *growth.rows(growth.measure(pair, Client))]
             back = sorted(back_after_kill(pair) for _ in range(5))[2]
         finally:
             pair.end()
@@ -230,7 +230,7 @@ def measure(build):
         ("threads of each process", str(threads), "1"),
         ("allocations while a client watches, arms, drives, stops", str(allocations), "0"),
         ("SIGKILL to first answer, median of 5", f"{back * 1000:.0f} ms", "≤ 300 ms"),
-        *beside,
+        *more,
     ]
 
 

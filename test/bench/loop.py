@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""What the gateway's loop costs in the states that users are in: instructions (callgrind) and system calls (strace) for each frame received.
+"""The cost of the gateway's loop in the states of its users: instructions (callgrind) and system calls (strace) per received frame.
 
-Over the local bus at the nominal 617 frames/s, as a process. Frames come when the simulator is woken, so that the figures move by a few per cent:
-they are held against limits. A machine under load makes them smaller, never larger.
+The gateway runs as a process over the local bus at the nominal 617 frames/s. Frames come when the simulator is woken, so the figures vary by a few per cent:
+they are compared with limits. A machine under load makes them smaller, never larger.
 """
 
 import re
@@ -25,7 +25,7 @@ SETTLE_S = 0.7
 
 
 def quiet(_client, _quit_it):
-    """A client that only is there."""
+    """A client that is only connected."""
 
 
 def watch(client, _quit_it):
@@ -42,7 +42,7 @@ def swallow(client):
 
 
 def drive(client, quit_it):
-    """Armed, and driving until the end."""
+    """A client that is armed and drives until the end."""
     for _ in range(100):
         if client.ask(cmd="arm", name="bench")["ok"]:
             break
@@ -57,7 +57,7 @@ def drive_once(client):
 
 
 def reason(client):
-    """Why the gateway has stopped while a client drove, by the refusal that the client got and the gateway's last stop."""
+    """The reason for a stop of the gateway while a client drove: the client's refusal and the gateway's last stop."""
     refusal = {key: value for key, value in getattr(client, "reply", {}).items() if key in ("error", "message")}
     try:
         stop = client.ask(cmd="why")
@@ -71,14 +71,14 @@ def keep_driving(client, quit_it):
         pass
 
 
-# What is done in a state, and by how many clients: the dearest first.
+# The work of a state, and the number of its clients: the most expensive first.
 STATES = {"driving": (drive, 1), "one client watching at 50 Hz": (watch, 1), "a client": (quiet, 1), "nobody": (None, 0)}
-# Of system calls, and of instructions. Tracing holds up a gateway that drives, so that its instructions are not counted.
+# Limits of system calls and of instructions. Tracing delays a driving gateway, so its instructions are not counted.
 LIMITS = {"driving": (2.5, None), "one client watching at 50 Hz": (2.5, 7000), "a client": (2.5, 3000), "nobody": (2.5, 1050)}
 
 
 def in_state(pair, client_type, state, count):
-    """`count()` while the gateway is in that state."""
+    """The result of `count()` while the gateway is in that state."""
     begin, clients = STATES[state]
     quit_it = threading.Event()
     connected = [client_type(pair.northbound) for _ in range(clients)]
@@ -102,19 +102,19 @@ def in_state(pair, client_type, state, count):
 
 
 def calls(pid):
-    """System calls in a second. A clock is none: the kernel maps it."""
+    """System calls per second. Reading a clock is not one: the kernel maps it."""
     trace = subprocess.Popen(["strace", "-f", "-c", "-q", "-p", str(pid)], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     time.sleep(WATCH_S)
     trace.send_signal(signal.SIGINT)
-    told = trace.communicate()[1]
-    total = re.search(r"^\s*100\.00\s+\S+\s+\S+\s+(\d+).*total$", told, re.M)
+    output = trace.communicate()[1]
+    total = re.search(r"^\s*100\.00\s+\S+\s+\S+\s+(\d+).*total$", output, re.M)
     if total is None:
-        raise RuntimeError(f"strace has counted nothing: {told.strip()[-200:]}")
+        raise RuntimeError(f"strace has counted nothing: {output.strip()[-200:]}")
     return int(total[1]) / WATCH_S
 
 
 def instructions(pid, folder):
-    """In a second. Callgrind counts anew from when it has written a file: the time is that between two of these, not between our orders."""
+    """Instructions per second. Callgrind restarts its count after it has written a file, so the time between two files counts, not between our requests."""
     dump = ["callgrind_control", "-d", str(pid)]
     begun, _ = written_by(dump, folder)
     time.sleep(WATCH_S)
@@ -125,7 +125,7 @@ def instructions(pid, folder):
 
 
 def written_by(dump, folder):
-    """When callgrind wrote the file that it was told to write, and the instructions in it."""
+    """The time when callgrind wrote the requested file, and the instructions in it."""
     before = set(folder.glob("callgrind.*"))
     subprocess.run(dump, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     for path in set(folder.glob("callgrind.*")) - before:
@@ -136,7 +136,7 @@ def written_by(dump, folder):
 
 
 def trial(pair, client_type, state, count, witness):
-    """The same, repeated only if the gateway has stopped while the machine stalled."""
+    """The same, repeated only if the gateway stopped while the machine stalled."""
     for left in (2, 1, 0):
         begin_us = now_us()
         try:
@@ -149,8 +149,8 @@ def trial(pair, client_type, state, count, witness):
 
 
 def rows(build, pair_type, client_type):
-    """(state, system calls and instructions for each frame), the dearest first; None: not measured. What is above its limit is measured once more:
-    wakings that fall together differ by chance, and the smaller figure is what the loop costs."""
+    """(state, system calls and instructions per frame), the most expensive first; None: not measured. A figure above its limit is measured once more:
+    wake-ups that coincide vary by chance, and the smaller figure is the cost of the loop."""
     found = measured(build, pair_type, client_type)
     if any(
         figure is not None and limit is not None and figure > limit for state, *figures in found for figure, limit in zip(figures, LIMITS[state], strict=True)
@@ -165,7 +165,7 @@ def rows(build, pair_type, client_type):
 
 
 def measured(build, pair_type, client_type):
-    # Callgrind in the gateway's children may write its last file after the gateway has ended.
+    # Callgrind in the gateway's child processes may write its last file after the gateway has ended.
     with tempfile.TemporaryDirectory(prefix="iwheel-bench-", ignore_cleanup_errors=True) as name:
         folder = Path(name)
         called = of_all(build, folder / "calls", pair_type, client_type, [], STATES, calls) if shutil.which("strace") else {}

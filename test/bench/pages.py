@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""docs/developer/speed.md, section by section, and the few of its rows that the README shows."""
+"""docs/developer/speed.md, section by section, and those of its rows that the README shows."""
 
 import os
 import platform
@@ -11,7 +11,7 @@ PAGE = ROOT / "docs/developer/speed.md"
 README = ROOT / "README.md"
 PROCESS = "## The gateway as a process"
 TIMED = "## Beside floor and peers"
-README_ROWS = {  # Of the page, and how the README says it.
+README_ROWS = {  # Row of the page, and its name in the README.
     "x86-64 decode": "read a frame, id and length checked: instructions on x86-64",
     "x86-64 encode": "write a setpoint, held within its limits: instructions on x86-64",
     "cortex-m4 decode": "read a frame on a Cortex-M4",
@@ -34,14 +34,14 @@ def table(head, rows):
 
 
 def put(title, lines):
-    """Replaces what stands between that title and the next one of its rank."""
+    """Replaces the text between that title and the next one of its level."""
     text = PAGE.read_text()
     body = "\n".join([title, "", *lines]).rstrip() + "\n"
     PAGE.write_text(re.sub(rf"^{re.escape(title)}\n.*?(?=^## |\Z)", lambda _: body + "\n", text, count=1, flags=re.M | re.S).rstrip() + "\n")
 
 
 def put_counted(tables, compilers):
-    """From the top of the page to the section of the process."""
+    """The page from its top to the section of the process."""
     lines = [
         "# Speed",
         "",
@@ -60,7 +60,7 @@ def put_process(measured):
     put(
         PROCESS,
         [
-            "Over the local bus with two simulated wheels (617 frames/s), on the machine that made this page. Not checked: it depends on the machine.",
+            "Over the local bus with two simulated wheels (617 frames/s), on the machine that wrote this page. Not checked: it depends on the machine.",
             "",
             *table(["", "figure", "goal"], [list(row) for row in measured]),
         ],
@@ -76,13 +76,13 @@ def put_timed(rows):
     put(
         TIMED,
         [
-            f"Made by `test/bench/run --timed` on {machine()}. All that is compared runs in turns in one boot of the kernel of test/kernel: Linux 6.1 as an "
+            f"Made by `test/bench/run --timed` on {machine()}. All candidates run in turns in one boot of the kernel of test/kernel: Linux 6.1 as an "
             "ordinary process, with one processor, vcan and gpio-sim. There a system call costs much more than on bare metal, "
-            "so that whoever calls less is further ahead; absolute times are worth nothing, ratios to the floor more. The floor is the leanest program that "
-            "does only this (`test/bench/timed/floor_*.c`); *leanest that looks* is the leanest that looks at bus and e-stop before it acts, as whoever drives "
-            "somebody must (`floor_looks.c`). Medians of three rounds; a turn beside which somebody who sleeps a millisecond was woken "
-            "10 ms late is repeated. The gateway runs with priority -10, as its unit runs it, and each socket may have a buffer of 4 MiB, as the package's "
-            "sysctl allows; with the kernel's own 208 KiB the gateway lost 26 to 37 % of a full bus beside four programs that compute. System calls are counted in virtual time, where each frame comes alone, however slowly they are traced.",
+            "so a program with fewer calls has a larger advantage; absolute times mean nothing, ratios to the floor more. The floor is the leanest program that "
+            "does only this (`test/bench/timed/floor_*.c`); *leanest that looks* is the leanest that reads bus and e-stop before it acts, as a program that drives "
+            "a person must (`floor_looks.c`). Medians of three rounds; a turn in which a program that sleeps a millisecond was woken "
+            "10 ms late is repeated. The gateway runs with priority -10, as in its unit, and each socket may have a buffer of 4 MiB, as the package's "
+            "sysctl allows; with the kernel's own 208 KiB the gateway lost 26 to 37 % of a full bus next to four programs that compute. System calls are counted in virtual time, where each frame comes alone, however slow the tracing is.",
             "",
             *table(["", "floor", "gateway", "peers", "goal"], rows),
         ],
@@ -91,7 +91,7 @@ def put_timed(rows):
 
 
 def put_timed_rows(rows):
-    """Of a part of the measures: each row takes the place of the one of its name, or stands at the end."""
+    """Updates a part of the measures: each row replaces the row of its name, or is added at the end."""
     before, section = PAGE.read_text().split(TIMED, 1)
     body, _, after = section.partition("\n## ")
     lines = body.rstrip().splitlines()
@@ -107,7 +107,7 @@ def put_timed_rows(rows):
 
 
 def put_readme():
-    """A handful of rows of the page: those of five cells, which say what, floor, gateway, peers and goal, and the memory, which has no peer."""
+    """Some rows of the page: those of five cells, with measure, floor, gateway, peers and goal; and the memory, which has no peer."""
     rows = []
     for line in PAGE.read_text().splitlines():
         cells = [cell.strip() for cell in line.strip("|").split("|")]

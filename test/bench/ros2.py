@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""The bridge to ROS 2 beside a program in C: how soon a command is on the bus, what it costs. Prints; docs/developer/speed.md has a paragraph of it.
+"""Compares the bridge to ROS 2 with a program in C: time until a command is on the bus, and cost. Prints the figures; docs/developer/speed.md has a paragraph on them.
 
 usage: test/bench/ros2.py [--build DIR] [--rounds N]    with .venv's python
 
-In turns in one run: commands by libiwheel-client (from the call to the first frame of its speed), and by cmd_vel: from the publisher's write, and from when
-DDS in the bridge's process had received it (ros2_stamps.c, preloaded).
+In turns in one run: commands through libiwheel-client (from the call to the first frame of its speed), and through cmd_vel: from the publisher's write, and from
+the time when DDS in the bridge's process had received it (ros2_stamps.c, preloaded).
 """
 
 import argparse
@@ -33,14 +33,14 @@ def to_frame(rig, commands):
     """Microseconds from each (t_us, speed) to the first frame with its speed."""
     frames, found = rig.bus.setpoints(commands[0][0]), []
     for t_us, speed in commands[5:]:
-        hit = next((at for at, _, told in frames if at >= t_us and told == speed), None)
+        hit = next((at for at, _, sent_speeds in frames if at >= t_us and sent_speeds == speed), None)
         if hit is not None and hit - t_us < EVERY_S * 1e6:
             found.append(hit - t_us)
     return found
 
 
 def command(send):
-    """Two speeds in turn; what was sent, as (t_us, speed)."""
+    """Sends two speeds in turn; returns them as (t_us, speed)."""
     sent = []
     for number in range(COMMANDS):
         sent.append((now_us(), SPEEDS[number % 2]))

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Preloaded into iwheel-ros2 by ros2.py: for each command that leaves, when DDS had received it and when it left, in us of CLOCK_MONOTONIC.
+// Preloaded into iwheel-ros2 by ros2.py: for each command, the time when DDS had received it and the time when it was sent, in us of CLOCK_MONOTONIC.
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <fcntl.h>
@@ -12,7 +12,7 @@
 #include <time.h>
 #include <unistd.h>
 
-/// A packet with a Twist in it has more; what only acknowledges has less.
+/// A packet with a Twist is at least this long; one that only acknowledges is shorter.
 #define DATA_MIN 96
 
 static _Atomic int64_t received_us;

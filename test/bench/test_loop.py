@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""What the benchmark of the loop reports of a gateway that stops while it is measured, by a made-up client.
+"""Tests what the benchmark of the loop reports when the gateway stops during a measurement, with a fake client.
 
 usage: test/bench/test_loop.py [unittest's arguments]
 """
@@ -18,7 +18,7 @@ STOPPED = {"ok": True, "cause": "stale_frames", "detail": "left wheel", "frames_
 
 
 class Client:
-    """Of a gateway that accepts `drives` commands and then refuses; `why`: its reply to that, or the exception."""
+    """A gateway that accepts `drives` commands and then refuses; `why`: its reply to that, or the exception."""
 
     why, drives = STOPPED, 3
 
@@ -45,7 +45,7 @@ class Stopped(unittest.TestCase):
             self.addCleanup(patch.stop)
 
     def stop(self, stalls=(), **client):
-        """What the trial raises."""
+        """The text of the exception of the trial."""
         pair = types.SimpleNamespace(northbound="none", gateway=types.SimpleNamespace(poll=lambda: None))
         witness = types.SimpleNamespace(stalls=lambda _begin_us, _end_us: list(stalls))
         with self.assertRaises(RuntimeError) as raised:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The example of libiwheel-client drives simulated wheels through the real gateway; however it dies, they stop."""
+"""The example program of libiwheel-client drives simulated wheels through the real gateway; the wheels stop however the program ends."""
 
 import os
 import shutil
@@ -18,8 +18,8 @@ from iwheel import Gateway
 
 with open(os.path.join(BUILD, "CMakeCache.txt"), encoding="utf-8") as cache:
     SANITIZED = ["-fsanitize=address,undefined"] if "-fsanitize=address,undefined" in cache.read() else []
-LEASE_MS = 300  # Of the rig.
-RAMP_MS = 200  # From 200 mm/s at 1500 mm/s2, and as much again for a busy machine.
+LEASE_MS = 300  # The rig configures this lease.
+RAMP_MS = 200  # The ramp from 200 mm/s at 1500 mm/s2 lasts 133 ms; the rest allows for a busy machine.
 
 
 class Example(RigCase):
@@ -40,7 +40,7 @@ class Example(RigCase):
             return gateway.status()["left"]["speed_mm_s"] or 0
 
     def start_driving(self):
-        """A drive without end, at full speed."""
+        """Starts a drive of ten minutes and waits until the wheel turns at more than 150 mm/s."""
         child = self.start(600)
         self.wait_until(lambda: self.speed() > 150)
         return child
@@ -64,10 +64,10 @@ class Example(RigCase):
             child = self.start_driving()
             died_us = now_us()
             child.send_signal(number)
-            self.assertIn(child.wait(5), (-number, 1) if SANITIZED else (-number,))  # A sanitizer ends what crashes by itself.
+            self.assertIn(child.wait(5), (-number, 1) if SANITIZED else (-number,))  # A sanitizer turns a crash into exit status 1.
             time.sleep(0.7)
             self.assertEqual("client_gone", self.cause(), number)
-            self.assert_stood_by(died_us, 60 + RAMP_MS + (500 if SANITIZED else 0))  # Its report takes time, and the lease ends.
+            self.assert_stood_by(died_us, 60 + RAMP_MS + (500 if SANITIZED else 0))  # A sanitizer first writes its report, and the lease ends meanwhile.
 
     def test_example_that_is_frozen_loses_its_lease(self):
         child = self.start_driving()
@@ -81,10 +81,10 @@ class Example(RigCase):
         child.send_signal(signal.SIGCONT)
         _, err = child.communicate(timeout=10)
         self.assertEqual(1, child.returncode)
-        self.assertIn("arm", err)  # Its next command is refused, with the cure.
+        self.assertIn("arm", err)  # The gateway refuses the next command and names the remedy.
         self.assertLess(self.last_motion_us(), thawed_us)
 
-    def test_example_whose_gateway_starts_anew_ends_and_moves_nothing(self):
+    def test_example_when_gateway_restarts_ends_and_moves_nothing(self):
         child = self.start_driving()
         self.rig.kill_gateway(signal.SIGKILL)
         killed_us = now_us()
@@ -118,12 +118,12 @@ class Example(RigCase):
         with Gateway(self.socket) as gateway:
             self.assertEqual(("client_stop", "client.cpp"), (gateway.why()["cause"], gateway.why()["client_name"]))
 
-    def test_example_without_a_gateway_or_with_a_second_one_says_so(self):
+    def test_example_without_or_with_second_gateway_reports_it(self):
         self.start_driving()
         second = self.start(1)
         _, err = second.communicate(timeout=10)
         self.assertEqual(1, second.returncode)
-        self.assertIn("drive_20", err)  # Who holds the lease.
+        self.assertIn("drive_20", err)  # The message names the client that has the lease.
         self.socket = "/nonexistent/gateway.sock"
         lost = self.start(1)
         _, err = lost.communicate(timeout=10)

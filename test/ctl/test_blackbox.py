@@ -88,7 +88,7 @@ class WithRig(unittest.TestCase):
 
 
 class BlackBox(WithRig):
-    def test_latched_stop_is_recorded_and_decided_again_byte_for_byte(self):
+    def test_latched_stop_recording_replays_byte_for_byte(self):
         stem = self.stop_by_button()
         self.assertTrue(stem.endswith("stop-000001-estop_line"))
         code, out, err = self.ctl("replay", stem + ".log")
@@ -105,7 +105,7 @@ class BlackBox(WithRig):
         self.assertTrue(all(re.search(r" (10A|12A)#", line) for line in own))
         self.assertIn("is recorded in " + stem + ".log", self.rig.gateway.text())
 
-    def test_refused_arm_of_a_contradicted_assumption_is_decided_again(self):
+    def test_arm_refused_by_contradicted_assumption_is_replayed(self):
         self.assertTrue(self.client.request("confirm", item="mount_sign_left", value="yes")["ok"])
         self.assertEqual("denied", self.client.request("arm", name="tester")["error"])
         time.sleep(1.2)  # Told again, for a recording that begins in the middle.
@@ -146,7 +146,7 @@ class BlackBox(WithRig):
         self.assertEqual("lease_lost", self.why()["cause"])
         self.assertEqual([], self.recordings())
 
-    def test_every_latched_stop_is_written_also_when_the_next_comes_at_once(self):
+    def test_latched_stops_in_quick_succession_are_all_written(self):
         for i in range(4):
             self.assertTrue(self.client.request("estop", reason=f"number {i}")["ok"])
             time.sleep(1.1)
@@ -155,7 +155,7 @@ class BlackBox(WithRig):
         reasons = [json.loads(read(name).splitlines()[1])["sentence"] for name in self.recordings("jsonl")]
         self.assertEqual([True] * 4, [f"number {i}" in reason for i, reason in enumerate(reasons)])
 
-    def test_killed_gateway_leaves_a_recording_and_its_successor_answers_at_once(self):
+    def test_gateway_killed_leaves_recording_and_restart_is_prompt(self):
         self.drive(0.8)
         self.rig.kill_gateway(signal.SIGKILL)
         answered_ms = self.rig.start_gateway(wheels=False, restart_hold=True)
@@ -173,7 +173,7 @@ class BlackBox(WithRig):
         time.sleep(0.3)
         self.assertEqual([], self.recordings())
 
-    def test_frozen_or_killed_writer_costs_the_recording_and_nothing_else(self):
+    def test_writer_frozen_or_killed_costs_only_the_recording(self):
         writer = children(self.rig.gateway.child.pid)["iwheel-blackbox"]
         os.kill(writer, signal.SIGSTOP)
         stream = self.drive(0.6)
@@ -314,7 +314,7 @@ class Pieces(WithRig):
         for name in ("", "a" * 64, "stop-000001-estop_line.log\0", "stop-000001-\u202e.log"):
             self.assertIn(self.client.request("recording", name=name)["error"], ("bad_value", "bad_json"), name)
 
-    def test_reader_that_is_frozen_or_killed_delays_neither_stop_nor_status_nor_recording(self):
+    def test_reader_frozen_or_killed_delays_no_stop_or_recording(self):
         self.stop_by_button()
         self.rig.release()
         time.sleep(1.2)
@@ -398,7 +398,7 @@ class Pieces(WithRig):
 class ShortBox(WithRig):
     config = {"record": {"blackbox_s": 2}}
 
-    def test_recording_that_begins_in_the_middle_of_a_drive_is_taken_up(self):
+    def test_recording_that_begins_during_a_drive_is_replayed(self):
         stream = self.drive(4.0, 300, -200)
         self.rig.press()
         time.sleep(0.3)
@@ -415,7 +415,7 @@ class ShortBox(WithRig):
 class NoBox(WithRig):
     config = {"record": {"blackbox_s": 0}}
 
-    def test_without_seconds_nothing_is_written_and_why_still_has_frames(self):
+    def test_recording_of_0_s_writes_no_file_and_why_has_frames(self):
         self.assertEqual(["iwheel-gateway"], sorted({*children(self.rig.gateway.child.pid), "iwheel-gateway"} - {"iwheel-keeper"}))
         self.assertTrue(self.client.request("estop")["ok"])
         time.sleep(0.5)

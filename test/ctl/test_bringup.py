@@ -180,7 +180,7 @@ class Bringup(unittest.TestCase):
             time.sleep(0.05)
         time.sleep(0.15)
 
-    def test_wheels_that_are_mirrored_in_other_units_and_of_another_radius(self):
+    def test_wheels_mirrored_with_other_units_and_radius_are_learned(self):
         for command in (
             "type 3",
             "role limit",
@@ -316,14 +316,14 @@ class Bringup(unittest.TestCase):
         operator.answer("Did both wheels turn", "y")
         return operator
 
-    def test_wheel_that_could_not_turn_by_current_alone_is_found_out_by_a_zero_that_turns_it(self):
+    def test_wheel_blocked_in_current_test_is_found_by_turning_zero(self):
         operator = self.held_during_the_tries()
         operator.expect("may be a limit")
         self.rig.sim.ask("unblock both")
         operator.expect("It TURNED")
         self.assertEqual("setpoint", self.offered(operator, "current_role"))
 
-    def test_wheel_that_runs_away_before_bringup_looks_is_found_out_by_the_stop(self):
+    def test_wheel_running_away_unobserved_is_found_by_the_stop(self):
         operator = self.held_during_the_tries()
         operator.expect("Neither wheel may turn")
         self.rig.sim.ask("unblock both")
@@ -350,7 +350,7 @@ class Bringup(unittest.TestCase):
         operator.type("y\n")
         operator.expect("it is a setpoint")
 
-    def test_recording_of_another_controller_suggests_type_and_length(self):
+    def test_recording_of_other_controller_suggests_type_and_length(self):
         recording = os.path.join(self.folder.name, "old.log")
         with open(recording, "w", encoding="utf-8") as file:
             for at in range(50):
@@ -411,7 +411,7 @@ class Bringup(unittest.TestCase):
         operator.expect("exchange the wheels")
         self.assertEqual(1, operator.wait())
 
-    def test_feedback_of_the_wrong_sign_is_no_matter_of_configuration(self):
+    def test_feedback_of_wrong_sign_ends_bringup_with_the_reason(self):
         self.rig.sim.ask("sign right swapped")
         operator = self.begin()
         operator.answer("types to try", "1")
@@ -423,7 +423,7 @@ class Bringup(unittest.TestCase):
         operator.expect("measures the opposite")
         self.assertEqual(1, operator.wait())
 
-    def test_interrupt_while_wheels_turn_stops_them_and_leaves_nothing_behind(self):
+    def test_interrupt_while_wheels_turn_stops_them_and_cleans_up(self):
         operator = self.begin()
         operator.answer("types to try", "1")
         operator.expect("any key stops it")
@@ -453,7 +453,7 @@ class Bringup(unittest.TestCase):
         operator.close()
         self.nothing_left_soon()
 
-    def test_killed_together_with_its_gateway_and_its_terminal_it_leaves_nothing_behind(self):
+    def test_bringup_killed_with_gateway_and_terminal_cleans_up(self):
         operator = self.begin()
         operator.expect("types to try")
         self.assertEqual(
@@ -511,7 +511,7 @@ class Bringup(unittest.TestCase):
         operator.answer("Turn the wheels by hand?", "q")
         self.assertEqual(1, operator.wait())
 
-    def test_gear_is_not_concluded_from_the_other_wheel_from_back_and_forth_or_from_none(self):
+    def test_gear_from_wrong_or_missing_turns_is_not_concluded(self):
         operator = self.begin(gear=True)
         operator.answer("Turn the wheels by hand?", "y")
         for pushes, told in ((("push right 3.6",), "RIGHT"), ((), "are no gear"), (("push left 3.6", "push left -1.8", "push left 1.8"), "back and forth")):
@@ -533,7 +533,7 @@ class Bringup(unittest.TestCase):
         operator.answer("types to try", "q")
         self.assertEqual(1, operator.wait())
 
-    def test_gear_without_seeing_whose_turns_the_rpm_count_is_not_confirmed(self):
+    def test_gear_with_unknown_rpm_reference_is_not_confirmed(self):
         for command in ("gear both 4", "rpm left rotor"):
             self.rig.sim.ask(command)
         operator = self.begin(gear=True)
@@ -548,7 +548,7 @@ class Bringup(unittest.TestCase):
         self.assertIsNone(found["rpm_of"])
         self.assertEqual("4", self.value("wheels", "gear_ratio"))
 
-    def test_type_that_turns_the_wheels_at_another_speed_is_not_confirmed(self):
+    def test_type_that_turns_at_another_speed_is_not_confirmed(self):
         for command in ("gear both 2", "rpm both rotor"):
             self.rig.sim.ask(command)
         operator = self.begin()
@@ -586,7 +586,7 @@ class Bringup(unittest.TestCase):
         self.assertEqual("noted: typed in; the wheels did not show it", self.write(operator)["current_role"])
         self.assertNotIn("confirm current_role", operator.text)
 
-    def test_current_that_turns_one_wheel_is_a_setpoint_that_is_not_confirmed(self):
+    def test_current_turning_one_wheel_is_unconfirmed_setpoint(self):
         self.rig.sim.ask("role setpoint")
         operator = self.begin()
         operator.answer("types to try", "1")
@@ -669,7 +669,7 @@ class Bringup(unittest.TestCase):
         self.assertRegex(found["track_mm"], r"^confirmed: 3 full turns by hand: left -?\d+, right -?\d+ ticks$")
         self.assertAlmostEqual(540, int(self.value("wheels", "track_mm")), delta=8)
 
-    def test_radius_of_a_curve_and_track_without_a_distance_are_not_confirmed(self):
+    def test_radius_of_curve_or_track_of_none_is_not_confirmed(self):
         operator = self.begin(gear=True)
         self.turn_by_hand(operator, 192)
         self.drive_through(operator)
@@ -778,7 +778,7 @@ class Bringup(unittest.TestCase):
         operator.type("\x03")
         self.ends_soon(operator)
 
-    def test_interrupt_at_a_question_or_while_the_force_is_measured_ends_it(self):
+    def test_interrupt_at_question_or_force_reading_ends_bringup(self):
         operator = self.begin()
         self.drive_through(operator, signs=False)
         self.look_at_signs(operator, mirrored=())
@@ -797,7 +797,7 @@ class Bringup(unittest.TestCase):
             operator.process.send_signal(number)
             self.ends_soon(operator)
 
-    def test_folder_in_tmp_is_removed_when_there_is_no_runtime_directory(self):
+    def test_folder_in_tmp_without_runtime_directory_is_removed(self):
         operator = self.start(variables=environment())
         operator.answer("finger on the e-stop?", "y")
         operator.expect("Press the e-stop button now")

@@ -81,7 +81,7 @@ class Grammar(unittest.TestCase):
         taking = {(verb, option) for verb in verbs() for option in re.findall(r"^(--[a-z-]+) TIME", run("help", verb)[1], re.MULTILINE)}
         self.assertEqual({(words[0], words[-1]) for words, _ in self.DURATIONS}, taking)
 
-    def test_verb_nearly_right_is_asked_after_and_a_strange_one_gets_the_list(self):
+    def test_verb_misspelt_gets_a_suggestion_and_unknown_the_list(self):
         for typed, meant in (("staus", "status"), ("recrod", "record"), ("dirve", "drive"), ("doc", "doctor"), ("hepl", "help")):
             code, _, err = run(typed)
             self.assertEqual((64, f'iwheelctl: unknown verb "{typed}"; did you mean {meant}? All: iwheelctl help\n'), (code, err))
@@ -172,7 +172,7 @@ class Help(unittest.TestCase):
             for line in out.splitlines():
                 self.assertLessEqual(len(line), 80, (program, words, line))
 
-    def test_every_option_that_a_page_explains_stands_in_its_usage_and_is_understood(self):
+    def test_options_of_each_page_are_in_its_usage_and_accepted(self):
         for verb in verbs():
             page = run("help", verb)[1]
             explained = set(re.findall(r"^(--[a-z-]+)", page, re.MULTILINE))
@@ -253,13 +253,13 @@ class Completion(unittest.TestCase):
         for shell in self.shells():
             self.assertLessEqual(set(verbs()), shell("iwheelctl", ""), shell.__name__)
 
-    def test_every_shell_offers_the_items_of_the_ledger_behind_confirm(self):
+    def test_shell_completion_after_confirm_offers_assumptions(self):
         for shell in self.shells():
             self.assertLessEqual(set(ITEMS), shell("iwheelctl", "confirm", ""), shell.__name__)
             self.assertIn("--how", shell("iwheelctl", "confirm", "track", "545", "--"), shell.__name__)
             self.assertFalse({"wheel_radius", "--socket"} & shell("iwheelctl", "confirm", "track", "--how", ""), shell.__name__)
 
-    def test_every_shell_offers_topics_sides_and_the_options_of_the_verb_only(self):
+    def test_shell_completion_offers_only_arguments_of_the_verb(self):
         for shell in self.shells():
             self.assertLessEqual({"state", "bus", "frame"}, shell("iwheelctl", "watch", ""), shell.__name__)
             self.assertLessEqual({"left", "right"}, shell("iwheelctl", "tare", ""))

@@ -573,7 +573,7 @@ class Check(unittest.TestCase):
         self.set("northbound", watch_socket=self.rig.path("a/b/watch.sock"))
         self.rig.start_gateway()
 
-    def test_socket_in_a_shared_directory_is_a_warning_as_at_the_start(self):
+    def test_socket_in_shared_directory_warns_as_at_the_start(self):
         os.mkdir(self.rig.path("shared"))
         os.chmod(self.rig.path("shared"), 0o1777)
         self.rig.socket_name = "shared/gateway.sock"
@@ -604,7 +604,7 @@ class Check(unittest.TestCase):
         self.set("wheels", setpoint_type="300")
         self.assertEqual(78, self.check("--estop", "ESTOP")[0])
 
-    def test_configuration_before_commissioning_is_right_for_listening_and_the_gateway_starts_with_it(self):
+    def test_config_before_commissioning_listens_and_refuses_arm(self):
         right = dict(self.rig.settings["wheels"])
         for missing, error in (("setpoint_type", "type_not_set"), ("current_role", "type_not_set"), ("track_mm", "track_not_set")):
             del self.rig.settings["wheels"][missing]
@@ -621,7 +621,7 @@ class Check(unittest.TestCase):
             self.set("wheels", **{missing: right[missing]})
         self.assertEqual(0, self.gone("warn", "not configured"))
 
-    def test_bus_that_cannot_be_opened_hides_neither_the_rest_nor_the_e_stop(self):
+    def test_bus_that_cannot_be_opened_hides_no_other_finding(self):
         code, found, done = self.check("--can", "nocan0")
         texts = [text for verdict in ("skip", "fail") for text in found.get(verdict, []) if "bus nocan0" in text]
         self.assertEqual(1, len(texts), done.stdout)

@@ -72,7 +72,7 @@ class Doctor(unittest.TestCase):
         time.sleep(0.05)
         return self.rig.bus.setpoints()
 
-    def test_healthy_pair_without_a_gateway_is_well_and_nothing_is_sent(self):
+    def test_healthy_pair_without_gateway_passes_and_sends_nothing(self):
         code, checks, whole = self.doctor(*self.button())
         self.assertEqual((0, True, False), (code, whole["ok"], whole["gateway"]), whole)
         self.assertEqual(["ok"], self.verdict(checks, "left_wheel"))
@@ -115,7 +115,7 @@ class Doctor(unittest.TestCase):
         self.assertIn("no simulator there", checks["interface"][0]["text"])
         self.assertEqual(["fail"], self.verdict(checks, "estop"))
 
-    def test_beside_a_driving_gateway_its_setpoints_are_no_second_master(self):
+    def test_setpoints_of_driving_gateway_are_no_second_master(self):
         self.rig.start_gateway()
         client = self.rig.client()
         client.request("arm")
@@ -152,7 +152,7 @@ class Doctor(unittest.TestCase):
         self.assertIn("iwheelctl reset", checks["gateway"][0]["cure"])
         self.assertIn("pressed", checks["estop"][0]["text"])
 
-    def test_bus_off_and_error_passive_are_told_beside_a_gateway_too_and_no_cable_is_blamed(self):
+    def test_bus_off_and_error_passive_are_reported_without_cable(self):
         for beside in (False, True):
             if beside:
                 self.rig.start_gateway()
@@ -208,7 +208,7 @@ class Doctor(unittest.TestCase):
         os.close(parent)
         self.assertIn("press and release were seen", text)
 
-    def test_gateway_that_does_not_answer_is_told_and_its_estop_line_left_alone(self):
+    def test_gateway_without_answer_is_reported_estop_line_unused(self):
         self.rig.start_gateway()
         self.rig.gateway.signal(signal.SIGSTOP)
         code, checks, _ = self.doctor()

@@ -226,7 +226,7 @@ class Showing(WithGateway):
         none = wheel(force_offset_mN=None, offset_provenance="none", offset_origin=None, offset_contaminated=True)
         self.assertRegex(self.show(snapshot(left=none)), r"force offset +-- none IN DOUBT +8\.000 N wheel")
 
-    def test_setpoint_that_is_never_acknowledged_though_the_wheels_are_heard_names_the_restart_of_the_link(self):
+    def test_setpoint_unacknowledged_by_online_wheels_names_restart(self):
         restart = ("ip link set can7 down; ip link set can7 up", "systemctl enable --now iwheel-can-restart@can7.path")
 
         class Stalled(FakeGateway):
@@ -263,14 +263,14 @@ class Showing(WithGateway):
                     self.assertEqual(heard and bus == "can7", command in text, (what, text))
                 self.assertEqual(not (heard and bus == "can7"), "check the wheels' power and the cable" in text, (what, text))
 
-    def test_why_of_a_setpoint_that_was_acknowledged_since_names_no_cure(self):
+    def test_why_of_setpoint_acknowledged_since_names_no_fix(self):
         class Cured(FakeGateway):
             def on_why(self, _connection, _request):
                 return {"ok": True, "number": 1, "cause": "send_stalled", "sentence": "setpoint not acknowledged", "at_us": 1}
 
         self.assertNotIn("still", self.ctl("why", gateway=self.serve(Cured))[1])
 
-    def test_contradiction_tells_evidence_and_cost_and_what_to_do_next(self):
+    def test_contradiction_shows_observation_cost_and_next_step(self):
         entry = {
             "state": "contradicted",
             "evidence": "operator",
@@ -353,7 +353,7 @@ class Showing(WithGateway):
             if words[0] == "--json" and words[1] == "status":
                 self.assertEqual(json.loads(out)["cause"], self.MOVING, "by number, so that programs read the same")
 
-    def test_watch_shows_events_by_number_where_they_would_move_the_terminal(self):
+    def test_watch_prints_control_characters_of_events_as_numbers(self):
         process = start("--socket", self.hostile().path, "watch")
         self.addCleanup(process.kill)
         line = process.stdout.readline()
@@ -425,7 +425,7 @@ class Showing(WithGateway):
 
         self.assertEqual("no stop since the gateway's start\n", self.ctl("why", gateway=self.serve(Empty))[1])
 
-    def test_why_of_a_board_without_a_clock_of_the_day_tells_the_age_alone(self):
+    def test_why_of_board_without_wall_clock_prints_only_the_age(self):
         stop = {"ok": True, "number": 1, "sentence": "somebody said stop", "latched": False, "age_ms": 553}
         for wall_us, wanted in ((None, r"\n0\.553 s ago; it did not latch\n"), (10**15, r"\nat 2001-09-0.*, 0\.553 s ago; it did not latch\n")):
             gateway = FakeGateway()
@@ -483,7 +483,7 @@ class Asking(WithGateway):
         self.assertEqual("left", self.gateway.requests[0][1]["side"])
         self.assertEqual(2, self.ctl("tare")[1].count("zero now, 8.000 N"))
 
-    def test_config_shows_stages_and_commits_and_says_what_is_not_in_force(self):
+    def test_config_shows_stages_commits_and_names_pending_values(self):
         self.assertEqual("wheels.setpoint_type is not set\ndrive.lease_ms = 200\n", self.ctl("config")[1])
         _, out, _, _ = self.ctl("config", "set", "drive.lease_ms", "300")
         self.assertEqual("drive.lease_ms = 300\nstaged, and not in force yet; next: iwheelctl config commit (or iwheelctl config discard)\n", out)
@@ -517,7 +517,7 @@ class Asking(WithGateway):
             self.assertIn(text, out)
         self.assertIn("the operator found something else", " ".join(self.ctl("status")[1].split()))
 
-    def test_confirm_sends_item_and_value_and_tells_what_that_makes_of_it(self):
+    def test_confirm_sends_item_and_value_and_prints_the_result(self):
         code, out, _, _ = self.ctl("confirm", "wheel_radius")
         self.assertEqual((0, "CONFIRMED     wheel_radius = 192: the operator ? says so\n"), (code, out))
         code, out, _, _ = self.ctl("confirm", "wheel_radius", "181")
@@ -632,7 +632,7 @@ class Driving(WithGateway):
         self.assertLessEqual(len(times), most)
         self.assertTrue(0.8 * seconds < spacing < 1.5 * seconds, spacing)
 
-    def test_a_command_lost_on_a_serial_line_does_not_end_the_drive_but_a_second_of_them_does(self):
+    def test_drive_with_serial_commands_lost_ends_only_after_1_s(self):
         class Lossy(FakeGateway):
             last = 10**6  # Of the commands, after which none is obeyed.
 
@@ -697,7 +697,7 @@ class Driving(WithGateway):
         self.assertIn('refused (busy): "joystick" drives', err)
         self.assertEqual(0, gateway.count("drive"))
 
-    def test_arm_refused_because_the_wheels_do_not_stand_yet_is_asked_again(self):
+    def test_arm_refused_before_standstill_is_requested_again(self):
         class ComingToRest(FakeGateway):
             def on_arm(self, connection, request):
                 if self.count("arm") < 4:
@@ -711,7 +711,7 @@ class Driving(WithGateway):
         self.assertEqual(4, gateway.count("arm"))
         self.assertGreater(gateway.times("drive")[0], gateway.times("arm")[-1])
 
-    def test_wheels_that_go_on_turning_are_waited_for_a_second_and_no_longer(self):
+    def test_wheels_that_go_on_turning_are_awaited_for_one_second(self):
         class Pushed(FakeGateway):
             def on_arm(self, _connection, _request):
                 return {"ok": False, "error": "not_at_rest", "message": "the wheels turn"}
@@ -919,7 +919,7 @@ class Watching(WithGateway):
         self.assertEqual(0, process.wait(5))
         process.communicate()
 
-    def test_slow_reader_gets_the_latest_values_and_how_many_were_left_out(self):
+    def test_slow_reader_gets_latest_values_and_number_of_skipped(self):
         class Flood(FakeGateway):
             total, done = 20000, False
 

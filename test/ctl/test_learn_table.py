@@ -139,7 +139,7 @@ class Matrix(unittest.TestCase):
         moves = "forward" in story.phases or "backward" in story.phases
         return (FOR, "yes") if moves and story.told[side] else OPEN
 
-    def test_learn_every_subset_of_motion_current_and_wheels_concludes_only_what_was_seen(self):
+    def test_learn_any_subset_of_inputs_concludes_only_from_them(self):
         subsets = [kinds for size in range(4) for kinds in itertools.combinations(PHASES, size)]
         count = 0
         for phases, current, told in itertools.product(subsets, itertools.product(CURRENTS, repeat=2), ((True, True), (True, False), (False, True))):
@@ -208,7 +208,7 @@ class Lacks(unittest.TestCase):
         self.assertEqual(set(self.TOLD) | {("wheel_lag", side) for side in SIDES}, set(found), "nothing else")
         self.assertEqual([(AGAINST, None)] * 2, [found[("wheel_lag", side)] for side in SIDES], "these wheels follow at once")
 
-    def test_learn_telemetry_of_neither_wheel_leaves_what_a_wheel_does_open(self):
+    def test_learn_telemetry_of_no_wheel_leaves_wheel_items_open(self):
         self.differs(
             {"setpoint_type": OPEN, "current_role": OPEN, "pair": OPEN, **self.both("feedback_sign", "speed_scale", "ticks_per_turn", "force_unit")},
             speeds=(False, False),
@@ -241,7 +241,7 @@ class Lacks(unittest.TestCase):
             turns=(False, True),
         )
 
-    def test_learn_wheel_that_stutters_shows_nothing_of_type_and_scale(self):
+    def test_learn_wheel_that_stutters_shows_no_type_and_no_scale(self):
         self.differs({"setpoint_type": OPEN, "current_role": OPEN, **self.both("speed_scale", "ticks_per_turn")}, stutters=True)
 
     def test_learn_wheel_that_runs_at_zero_speaks_against_a_limit(self):
@@ -264,7 +264,7 @@ class Lacks(unittest.TestCase):
         for key in (("setpoint_type", None), ("feedback_sign", "left"), ("speed_scale", "right")):
             self.assertEqual(OPEN, found[key], key)
 
-    def test_learn_types_that_change_or_differ_speak_against_one_type(self):
+    def test_learn_types_that_change_or_differ_contradict_one_type(self):
         unsure = {"setpoint_type": (AGAINST, None)}
         self.differs(unsure, types=(3, 4))
         found = self.differs(unsure, second_type=9)
@@ -284,7 +284,7 @@ class Lacks(unittest.TestCase):
             found = self.differs({"current_role": OPEN}, sent=sent)
             self.assertEqual((AGAINST, None), found[("sender", None)])
 
-    def test_learn_currents_that_differ_from_wheel_to_wheel_are_no_role(self):
+    def test_learn_currents_different_per_wheel_suggest_no_role(self):
         for currents in (("same", "scaled"), ("scaled", "same"), ("same", "zero"), ("negative", "scaled")):
             self.differs({"current_role": OPEN}, currents=currents)
 
@@ -321,7 +321,7 @@ class Lacks(unittest.TestCase):
         self.differs({"force_unit left": (AGAINST, None), "force_unit right": (AGAINST, None)}, raw=(0, 80))
         self.differs({"force_unit left": (AGAINST, "dN"), "force_unit right": (AGAINST, "cN")}, raw=(20, 200))
 
-    def test_learn_pose_that_is_absent_stands_or_jumps_once_has_no_byte_order(self):
+    def test_learn_pose_absent_constant_or_jumping_has_no_order(self):
         for lack in ({"poses": 0}, {"pose_step": 0}, {"poses": 3, "pose_step": 5000}):
             self.differs({"pose_byte_order": OPEN}, **lack)
         self.differs({"pose_byte_order": (AGAINST, "no")}, pose_little=True)
@@ -330,7 +330,7 @@ class Lacks(unittest.TestCase):
 class AsJson(unittest.TestCase):
     """The JSON object says what the text says."""
 
-    def test_learn_json_has_every_sentence_and_every_suggestion_of_the_text(self):
+    def test_learn_json_has_each_sentence_and_suggestion_of_text(self):
         for story in (Story(), Story(phases=("forward",)), Story(types=(3, 4), spare=(3,)), Story(raw=(20, 200), sent="all"), Story(told=(False, False))):
             code, out, _ = learn(story, "--json")
             code_of_text, text, _ = learn(story)
@@ -360,6 +360,6 @@ class AsJson(unittest.TestCase):
         self.assertEqual([256, 288, 257, 289, 290, 512, 544, 513, 545], [each["id"] for each in told["telemetry"]])
         self.assertEqual(None, json.loads(learn(Story(told=(False, True)), "--json")[1])["setpoints"]["left"]["current_mA"])
 
-    def test_learn_json_of_an_empty_recording_is_an_object_and_the_answer_no(self):
+    def test_learn_json_without_telemetry_is_object_and_status_1(self):
         done = subprocess.run([PROGRAM, "--json", "learn", "-"], input="(1.000000) can0 100#00000000\n", text=True, capture_output=True, check=False)
         self.assertEqual((1, 1), (done.returncode, json.loads(done.stdout)["frames"]))

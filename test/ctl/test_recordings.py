@@ -285,7 +285,7 @@ class Decode(unittest.TestCase):
         ):
             self.assertIn(part, out)
 
-    def test_csv_has_units_in_its_header_and_empty_cells_for_what_is_not_there(self):
+    def test_csv_has_units_in_header_and_empty_cells_for_no_value(self):
         row, other = self.rows(lines("10A#01012C07D0", "101#FFFF000000641E"))
         self.assertEqual(
             ("1760000000.000000", "266", "0x10A", "5", "left", "setpoint"),
@@ -295,7 +295,7 @@ class Decode(unittest.TestCase):
         self.assertEqual(("255", "", "100", "30"), tuple(other[name] for name in ("battery_dV", "temperature_degC", "odometry_ticks", "cpu_percent")))
         self.assertIn("impossible", other["note"])
 
-    def test_unknown_bad_and_strange_frames_are_shown_as_bytes_with_the_reason(self):
+    def test_undecodable_frames_are_shown_as_bytes_with_the_reason(self):
         rows = self.rows(lines("123#0102", "10A#0101", "0000010A#0101F40064", "10A#R5", "10A##0" + "AB" * 64, "20000004#00"))
         self.assertEqual(["unknown", "ignored", "ignored", "ignored", "ignored", "error"], [row["message"] for row in rows])
         self.assertEqual("0102", rows[0]["data_hex"])
@@ -303,7 +303,7 @@ class Decode(unittest.TestCase):
         self.assertIn("shorter", rows[1]["note"])
         self.assertIn("11-bit", rows[2]["note"])
 
-    def test_bad_lines_are_told_with_number_and_cure_and_lose_nothing_else(self):
+    def test_bad_lines_are_reported_with_fix_and_lose_nothing_else(self):
         code, out, err = self.decode(lines("100#00000000") + "garbage\r\n" + lines("100#00000001").replace("\n", "\r\n") + "(1760000001.0) can0 100#0000")
         self.assertEqual(65, code)
         self.assertEqual(2, out.count("left  speed"))
@@ -311,7 +311,7 @@ class Decode(unittest.TestCase):
         self.assertIn("standard input:4: the last line has no line end", err)
         self.assertIn("2 of 4 lines", err)
 
-    def test_interface_names_that_would_move_the_terminal_are_bad_lines(self):
+    def test_interface_names_of_control_characters_are_bad_lines(self):
         for name in ("\x9b2J", "c\u009bn", "c\u202en", "c\u2028n", "\x7f"):
             for words in (("decode",), ("decode", "--csv"), ("--json", "decode")):
                 code, out, err = run(*words, text=f"(1760000000.000000) {name} 100#00000000\n")

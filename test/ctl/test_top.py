@@ -105,7 +105,7 @@ class WithWheels(unittest.TestCase):
                     return top.look(0.5)
         raise AssertionError("it never drove:\n" + "\n".join(rows))
 
-    def test_one_screen_shows_everything_and_the_state_in_big_letters(self):
+    def test_top_on_one_screen_shows_all_and_state_in_big_letters(self):
         top = self.top()
         rows = top.wait_for("LEDGER")
         self.assertEqual(24, len(rows))
@@ -176,7 +176,7 @@ class WithWheels(unittest.TestCase):
                 self.assertTrue(any("SPACE stop" in row for row in screen), (columns, rows, screen))
         self.assertEqual(0, top.end())
 
-    def test_40_columns_have_whole_lines_not_the_beginnings_of_long_ones(self):
+    def test_top_with_40_columns_shows_whole_lines(self):
         top = self.top(40, 24)
         rows = top.wait_for("LEDGER")
         for text in ("e-stop released (SIMULATED)", " LISTENING ", "SPACE stop  E e-stop  R reset  Q quit", "worst --"):
@@ -361,14 +361,14 @@ class WithoutWheels(unittest.TestCase):
         operator.expect("this terminal cannot draw")
         self.assertEqual(64, operator.wait())
 
-    def test_dumb_terminal_is_told_what_works_there_and_nothing_is_drawn(self):
+    def test_top_on_dumb_terminal_names_another_verb_and_ends(self):
         operator = Operator([find_program(BUILD, "iwheelctl"), "--socket", "/nonexistent", "top"], environment(TERM="dumb"))
         self.addCleanup(operator.close)
         operator.expect("(TERM=dumb); without drawing: iwheelctl status, or iwheelctl watch")
         self.assertEqual(64, operator.wait())
         self.assertNotIn(b"\x1b", operator.raw)
 
-    def test_drive_on_a_dumb_terminal_writes_no_commands_and_on_a_narrow_one_keeps_to_its_line(self):
+    def test_drive_on_dumb_or_narrow_terminal_stays_on_its_line(self):
         for more, columns in (({"TERM": "dumb"}, 80), ({}, 40)):
             gateway = FakeGateway()
             self.addCleanup(gateway.close)

@@ -16,11 +16,11 @@
 #define CLIENTS  VK_STREAMS
 #define MARKS    64U
 #define PATIENCE (400U * MS)
-#define AGAIN    (700U * MS) ///< After a refusal; longer than a command is stale.
+#define AGAIN    (700U * MS) ///< Pause after a refusal; longer than the age of a stale command.
 
 typedef enum { STEP_RESET, STEP_ARM, STEP_ARMING, STEP_DRIVE, STEP_END } step_t;
 
-/// Where in the bytes that were sent a request ends.
+/// The end of a request in the sent bytes.
 typedef struct {
     uint64_t end;
     said_t what;
@@ -40,10 +40,10 @@ typedef struct {
     iw_time_us_t driving_us;
     uint32_t period_us;
     uint32_t id;
-    uint64_t sent; ///< Bytes on this connection.
+    uint64_t sent; ///< Bytes sent on this connection.
     mark_t mark[MARKS];
     unsigned marks;
-    int answer; ///< To `id`: 1 yes, 0 no, -1 none yet.
+    int answer; ///< Reply to `id`: 1 ok, 0 refused, -1 none yet.
 } client_t;
 
 static client_t clients[CLIENTS];
@@ -54,7 +54,7 @@ void clients_begin(uint64_t seed) {
     sim_random_init(&dice, seed ^ UINT64_C(0xC11E));
 }
 
-/// Nobody follows what the process reads of it from now on: an arm that it has not read yet may still be carried out.
+/// Reports requests that wait: from now on the client does not know what the process reads, and an unread arm may still be carried out.
 static void say_what_waits(const client_t *client) {
     for (unsigned i = 0; i < client->marks; i++) {
         if (client->mark[i].what == SAID_ARM) {
@@ -71,18 +71,18 @@ static void hang_up(client_t *client, bool half) {
         stream->client_end = stream->client_end || !half;
         judge_gone((unsigned)client->stream);
         if (!half) {
-            stream->taken = stream->taken && !stream->closed;
+            stream->used = stream->used && !stream->closed;
             client->stream = -1;
         }
     }
     client->driving_us = IW_NEVER;
 }
 
-/// Ends that are closed on both sides are free again.
+/// Frees connections that are closed on both sides.
 static void collect(void) {
     for (unsigned i = 0; i < VK_STREAMS; i++) {
         vk_stream_t *stream = &vk.stream[i];
-        stream->taken = stream->taken && !(stream->closed && stream->client_end);
+        stream->used = stream->used && !(stream->closed && stream->client_end);
     }
 }
 
@@ -129,9 +129,9 @@ iw_time_us_t clients_driving_us(void) {
     return since_us;
 }
 
-// ---- talking -----------------------------------------------------------------------------------------------------
+// ---- requests ----------------------------------------------------------------------------------------------------
 
-/// Bytes as they are; false: there is no room for them.
+/// Sends bytes unchanged. Returns false if they do not fit.
 static bool put(client_t *client, const char *bytes, size_t length) {
     vk_stream_t *stream = (client->stream < 0) ? NULL : &vk.stream[client->stream];
     if (stream == NULL || stream->closed || stream->shut || length > VK_IN_SIZE - stream->in_length) {
@@ -143,7 +143,7 @@ static bool put(client_t *client, const char *bytes, size_t length) {
     return true;
 }
 
-__attribute__((format(printf, 3, 4))) static void say(client_t *client, said_t what, const char *format, ...) {
+__attribute__((format(printf, 3, 4))) static void send_request(client_t *client, said_t what, const char *format, ...) {
     char line[160];
     va_list arguments;
     va_start(arguments, format);
@@ -157,14 +157,14 @@ __attribute__((format(printf, 3, 4))) static void say(client_t *client, said_t w
 }
 
 void clients_taken(int number) {
-    const uint64_t taken = vk.stream[number].in_total;
+    const uint64_t received = vk.stream[number].in_total;
     for (unsigned i = 0; i < CLIENTS; i++) {
         client_t *client = &clients[i];
         if (!client->lives || client->stream != number) {
             continue;
         }
         unsigned done = 0;
-        while (done < client->marks && client->mark[done].end <= taken) {
+        while (done < client->marks && client->mark[done].end <= received) {
             const mark_t *mark = &client->mark[done++];
             if (mark->what == SAID_DRIVE) {
                 judge_wanted((unsigned)number, mark->left, mark->right);
@@ -176,7 +176,7 @@ void clients_taken(int number) {
     }
 }
 
-/// Looked at only soon after a call has failed: what may tear a line is that one was sent in part.
+/// Checks lines only soon after a failed call: a line that was sent in part may be torn.
 static void judge_line(const char *line, size_t length) {
     static iwn_work_t work;
     char why[128];
@@ -184,11 +184,11 @@ static void judge_line(const char *line, size_t length) {
     iwn_json_t root;
     if (vk.failed_us != 0U && vk.now_us - vk.failed_us < 1000U * MS &&
         !iwn_json_check(line, length, &work, &root, &text)) {
-        judge_break(14, "a line to a client that is none: %.60s", line);
+        judge_break(14, "an invalid line to a client: %.60s", line);
     }
 }
 
-/// Looks for the answer to the last request; everything else is passed over.
+/// Searches the reply to the last request and skips everything else.
 static void listen(client_t *client) {
     char wanted[32];
     vk_stream_t *stream = (client->stream < 0) ? NULL : &vk.stream[client->stream];
@@ -217,15 +217,16 @@ static void listen(client_t *client) {
 
 static void ask(client_t *client, said_t what, const char *verb, step_t next) {
     client->id++;
-    say(client, what, "{\"cmd\":\"%s\",\"id\":%u}\n", verb, (unsigned)client->id);
+    send_request(client, what, "{\"cmd\":\"%s\",\"id\":%u}\n", verb, (unsigned)client->id);
     client->step = next;
 }
 
 static void drive(client_t *client) {
     const bool nonzero = client->task.a != 0 || client->task.b != 0;
     client->id++;
-    say(client, nonzero ? SAID_DRIVE : SAID_ZERO, "{\"cmd\":\"drive\",\"id\":%u,\"left_mm_s\":%d,\"right_mm_s\":%d}\n",
-        (unsigned)client->id, client->task.a, client->task.b);
+    send_request(client, nonzero ? SAID_DRIVE : SAID_ZERO,
+                 "{\"cmd\":\"drive\",\"id\":%u,\"left_mm_s\":%d,\"right_mm_s\":%d}\n", (unsigned)client->id,
+                 client->task.a, client->task.b);
 }
 
 static void begin_anew(client_t *client) {
@@ -243,7 +244,7 @@ static void end_drive(client_t *client) {
         hang_up(client, false);
         client->lives = false;
         break;
-    case 2: // Falls silent; its connection stays.
+    case 2: // Sends no more; its connection stays.
         client->step = STEP_END;
         client->driving_us = IW_NEVER;
         client->next_us = vk.now_us + 3000U * MS;
@@ -311,7 +312,8 @@ static void run_blind(client_t *client) {
 
 static void run_watcher(client_t *client) {
     if (client->step == STEP_RESET) {
-        say(client, SAID_ZERO,
+        send_request(
+            client, SAID_ZERO,
             "{\"cmd\":\"watch\",\"id\":1,\"topics\":[\"state\",\"stop\",\"status\",\"frame\"],\"rate_hz\":%d}\n",
             5 + client->task.b % 50);
         client->step = STEP_ARM;
@@ -319,7 +321,7 @@ static void run_watcher(client_t *client) {
     client->next_us = vk.now_us + 30U * MS;
 }
 
-/// What nobody should say, or not so; some of it stops or resets.
+/// Unusual or invalid requests; some of them stop or reset.
 static void run_noise(client_t *client) {
     static const struct {
         const char *text;
@@ -346,7 +348,7 @@ static void run_noise(client_t *client) {
         return;
     }
     if (choice < sizeof words / sizeof words[0]) {
-        // In two pieces, as a network may bring it.
+        // The request comes in two pieces, as over a network.
         const char *text = words[choice].text;
         const size_t first = sim_random_below(&dice, (uint32_t)strlen(text));
         if (put(client, text, first) && put(client, &text[first], strlen(text) - first) && client->marks < MARKS) {
@@ -354,7 +356,7 @@ static void run_noise(client_t *client) {
                 (mark_t){client->sent, words[choice].what, words[choice].left, words[choice].right};
         }
     } else if (choice == sizeof words / sizeof words[0]) {
-        // A line that is none; one that is too long is the last that is read of this connection.
+        // An invalid line; one that is too long is the last that the gateway reads from this connection.
         memset(flood, 'x', sizeof flood);
         const size_t length = 1U + sim_random_below(&dice, sizeof flood);
         flood[length - 1U] = '\n';

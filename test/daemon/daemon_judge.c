@@ -11,31 +11,31 @@
 #define S           1000000U
 #define CLIENTS     VK_STREAMS
 #define ENDS        16U
-#define LATE_US     (100U * MS) ///< Our own loop may be so late without consequence.
-#define GONE_US     (60U * MS)  ///< From a client's death to the ramp.
+#define LATE_US     (100U * MS) ///< Permitted delay of the gateway's loop.
+#define GONE_US     (60U * MS)  ///< Time from a client's death to the ramp.
 #define GAP_US      (100U * MS)
-#define RESTART_US  (100U * MS) ///< From the start of the process to the zeros.
-#define START_US    (5U * MS)   ///< The calls of a start take less.
-#define HOLD_MAX_US (63U * S)   ///< Ramp, a minute of zeros for wheels that will not stand, and some.
-#define CALM_US     (300U * MS) ///< After trouble with the bus, gaps are not judged for so long.
-#define WATCHDOG_US S           ///< Of the wheels.
-#define WANTED      3U          ///< Commands that may still be followed: the last ones.
-#define WAITS_MAX   8000U       ///< In a second.
+#define RESTART_US  (100U * MS) ///< Time from the start of the process to the zeros.
+#define START_US    (5U * MS)   ///< Longer than the calls of a start.
+#define HOLD_MAX_US (63U * S)   ///< Ramp, a minute of zeros for wheels that keep turning, and a margin.
+#define CALM_US     (300U * MS) ///< Time after a fault of the bus in which gaps are not judged.
+#define WATCHDOG_US S           ///< Watchdog of the wheels.
+#define WANTED      3U          ///< Number of last commands that setpoints may still follow.
+#define WAITS_MAX   8000U       ///< Limit of waits in a second.
 
 typedef struct {
     iw_time_us_t at_us;
     iw_time_us_t stolen_us;
     iw_time_us_t limit_us;
     const char *why;
-    bool armed[CLIENTS]; ///< An arm was read since,
-    bool fresh[CLIENTS]; ///< and a drive behind it.
+    bool armed[CLIENTS]; ///< An arm was read after this end,
+    bool fresh[CLIENTS]; ///< and a drive after the arm.
 } end_t;
 
 typedef struct {
-    iw_time_us_t sent_us; ///< Last accepted.
+    iw_time_us_t sent_us; ///< Time of the last accepted setpoint.
     iw_time_us_t stolen_us;
     int32_t speed;
-    unsigned pending; ///< Accepted, and the gateway has not taken its echo.
+    unsigned pending; ///< Accepted setpoints whose echo the gateway has not read.
     bool zeroed;      ///< A zero of this life was on the bus.
 } side_t;
 
@@ -47,32 +47,32 @@ static struct {
     end_t end[ENDS];
     unsigned ends;
     int32_t wanted[CLIENTS][WANTED][IW_SIDES];
-    iw_time_us_t drive_us[CLIENTS]; ///< Its last nonzero drive was read.
+    iw_time_us_t drive_us[CLIENTS]; ///< Time when the gateway read the last nonzero drive.
     iw_time_us_t drive_stolen_us[CLIENTS];
     iw_time_us_t gone_us[CLIENTS];
     iw_time_us_t gone_stolen_us[CLIENTS];
-    iw_time_us_t may_send_until_us; ///< 0: not at all.
-    iw_time_us_t armed_us;          ///< An arm was read in silence.
-    iw_time_us_t moved_us;          ///< The last nonzero one was accepted: zeros are held from then on.
-    iw_time_us_t fault_us;          ///< Last trouble with the bus.
+    iw_time_us_t may_send_until_us; ///< The gateway may send until this time; 0: not at all.
+    iw_time_us_t armed_us;          ///< Time when the gateway read an arm in silence.
+    iw_time_us_t moved_us;          ///< Time of the last accepted nonzero setpoint: zeros are held from then on.
+    iw_time_us_t fault_us;          ///< Time of the last fault of the bus.
     iw_time_us_t fault_stolen_us;
     iw_time_us_t life_us;
     iw_time_us_t life_stolen_us;
     iw_time_us_t killed_us;
     iw_time_us_t second_us;
     uint64_t second_waits;
-    unsigned frames;  ///< Of this life.
+    unsigned frames;  ///< Frames of this life.
     unsigned foreign; ///< Setpoints of others on the bus, in this life.
     phase_t killed_at;
-    int tried_side;     ///< Of the last frame; -1: of none in this life.
-    bool tried_nonzero; ///< And it was accepted.
-    bool broken;        ///< A nonzero one was not: the next must be zero.
+    int tried_side;     ///< Side of the last frame; -1: none in this life.
+    bool tried_nonzero; ///< The last frame was nonzero and accepted.
+    bool broken;        ///< A nonzero frame was not accepted: the next must be zero.
     bool reset_said;
-    bool armed_said; ///< An arm, in this life.
-    bool owes;       ///< Something was in force when the process died: zeros are due.
-    bool something;  ///< Something was, or may have been, sent before it died.
-    int32_t sum;     ///< Of both wheels' speeds without sign, after the last pair,
-    int32_t trend;   ///< and how it had changed.
+    bool armed_said; ///< An arm was read in this life.
+    bool owes;       ///< Motion was commanded when the process died: zeros are due.
+    bool something;  ///< A setpoint was, or may have been, sent before the process died.
+    int32_t sum;     ///< Sum of both wheels' absolute speeds after the last pair,
+    int32_t trend;   ///< and its last change.
 } self;
 
 void judge_begin(const scenario_t *scenario, result_t *result) {
@@ -94,10 +94,10 @@ void judge_break(uint32_t rule, const char *format, ...) {
     va_start(arguments, format);
     (void)vsnprintf(self.result->text, sizeof self.result->text, format, arguments);
     va_end(arguments);
-    vk.end_us = vk.now_us; // What comes after it says no more.
+    vk.end_us = vk.now_us; // Later events prove nothing.
 }
 
-/// Time of the process since then: what it could not use is not counted.
+/// Time since then in which the process could run.
 static iw_time_us_t own_us(iw_time_us_t since_us, iw_time_us_t stolen_us) {
     const iw_time_us_t stolen = vk.stolen_us - stolen_us;
     const iw_time_us_t passed = vk.now_us - since_us;
@@ -109,7 +109,7 @@ static iw_time_us_t ramp_us(void) {
            2U * (iw_time_us_t)self.config->period_ms * MS;
 }
 
-// ---- what goes in ------------------------------------------------------------------------------------------------
+// ---- input -------------------------------------------------------------------------------------------------------
 
 void judge_end(const char *why, iw_time_us_t limit_us) {
     if (!self.alive) {
@@ -178,7 +178,7 @@ void judge_echo(unsigned side) {
     self.side[side].pending -= (self.side[side].pending > 0U) ? 1U : 0U;
 }
 
-// ---- what comes out ----------------------------------------------------------------------------------------------
+// ---- output ------------------------------------------------------------------------------------------------------
 
 typedef enum { MAY_STAND, MAY_FALL, MAY_MOVE } right_t;
 
@@ -186,7 +186,7 @@ static right_t lesser(right_t one, right_t other) {
     return (one < other) ? one : other;
 }
 
-/// What is left `since` something that ends by a ramp: as before for `free_us`, then towards zero.
+/// The right `since` an event that ends motion by a ramp: as before for `free_us`, then towards zero.
 static right_t after(iw_time_us_t since_us, iw_time_us_t stolen_us, iw_time_us_t free_us) {
     const iw_time_us_t passed_us = own_us(since_us, stolen_us);
     return (passed_us <= free_us) ? MAY_MOVE : (passed_us <= free_us + ramp_us()) ? MAY_FALL : MAY_STAND;
@@ -200,14 +200,14 @@ static right_t after_end(const end_t *end) {
     return (end->limit_us > JUDGE_REACTION_US && passed_us > GONE_US) ? MAY_FALL : MAY_MOVE;
 }
 
-/// Killed now, its next start must find that it was moving. A marker that could not be made is made soon.
+/// After a kill the next start must detect the motion. A marker that could not be written is written soon.
 static void judge_marker(void) {
     if (!vk_file_exists(VK_MARKER) && own_us(vk.failed_us, vk.failed_stolen_us) > CALM_US) {
         judge_break(10, "a nonzero setpoint without a crash marker");
     }
 }
 
-/// What this client's commands may do to the wheels, and which end forbids more.
+/// The right that this client's commands give, and the end that limits it.
 static right_t right_of(unsigned client, const char **out_why) {
     const iw_time_us_t lease_us = ((iw_time_us_t)self.config->lease_ms + self.config->period_ms) * MS + LATE_US;
     if (self.drive_us[client] == IW_NEVER) {
@@ -217,7 +217,7 @@ static right_t right_of(unsigned client, const char **out_why) {
     *out_why = (right != MAY_MOVE) ? "its lease is over" : *out_why;
     if (self.gone_us[client] != IW_NEVER) {
         right = lesser(right, after(self.gone_us[client], self.gone_stolen_us[client], GONE_US));
-        *out_why = "its client has gone";
+        *out_why = "its client has disconnected";
     }
     for (unsigned i = 0; i < self.ends; i++) {
         const end_t *end = &self.end[i];
@@ -238,12 +238,12 @@ static bool is_wanted(unsigned client, unsigned side, int32_t speed) {
     return false;
 }
 
-/// Slower is allowed as long as any ramp lasts; as fast as before or faster only if somebody who may wants it.
+/// Slower is allowed during a ramp; as fast as before or faster only by a command of a client that may drive.
 static void judge_right(unsigned side, int32_t speed) {
-    // Both ramp together: rounded, the slower one may stay for a pair.
+    // Both wheels ramp together: by rounding, the slower one may keep its speed for a pair.
     const int32_t before = abs(self.side[side].speed);
     const bool falls = abs(speed) < before || (abs(speed) == before && before < abs(self.side[1U - side].speed));
-    const char *why = "nobody drives";
+    const char *why = "no client drives";
     bool allowed = false;
     for (unsigned i = 0; i < CLIENTS; i++) {
         const right_t right = right_of(i, &why);
@@ -251,7 +251,7 @@ static void judge_right(unsigned side, int32_t speed) {
             allowed || (right == MAY_MOVE && (falls || is_wanted(i, side, speed))) || (right == MAY_FALL && falls);
     }
     if (!allowed) {
-        judge_break(1, "%s wheel told %d mm/s, before %d, but: %s", (side == IW_LEFT) ? "left" : "right", speed,
+        judge_break(1, "%s wheel commanded %d mm/s, before %d, but: %s", (side == IW_LEFT) ? "left" : "right", speed,
                     self.side[side].speed, why);
     }
 }
@@ -265,7 +265,7 @@ static void judge_slope(const side_t *side, int32_t speed) {
         judge_break(8, "from %d to %d mm/s without a zero", side->speed, speed);
     }
     if (vk.stolen_us - side->stolen_us > MS) {
-        return; // When the step began is not known.
+        return; // The time when the step began is unknown.
     }
     span_us = (away && span_us > 2U * period_us) ? 2U * period_us : span_us;
     const uint64_t slope = away ? config->accel_mm_s2 : config->decel_mm_s2;
@@ -282,16 +282,16 @@ static void judge_form(const iw_can_frame_t *frame, int32_t speed, int32_t curre
         judge_break(8, "frame 0x%X with %u bytes of type %u", (unsigned)frame->id, frame->dlc, frame->data[0]);
     }
     if (abs(speed) > config->max_speed_mm_s || current < 0 || current > config->max_current_mA) {
-        judge_break(8, "%d mm/s with %d mA is beyond what is configured", speed, current);
+        judge_break(8, "%d mm/s with %d mA is beyond the configured limits", speed, current);
     }
 }
 
 static void judge_presence(void) {
     if (!self.armed_said && !self.something && !vk.marker_failed) {
-        judge_break(3, "a setpoint, though nobody has asked to arm and nothing had been sent before the start");
+        judge_break(3, "a setpoint, though no client has requested to arm and nothing had been sent before the start");
     }
     if (vk.now_us > self.may_send_until_us + vk.stolen_us - self.life_stolen_us) {
-        judge_break(4, "still sending, though nobody has driven for 13 s");
+        judge_break(4, "still sending, though no client has driven for 13 s");
     }
 }
 
@@ -312,7 +312,7 @@ static void note_accepted(unsigned number, int32_t speed) {
     side->speed = speed;
     side->sent_us = vk.now_us;
     side->stolen_us = vk.stolen_us;
-    side->pending += vk.link.off ? 0U : 1U; // Bus-off, the controller keeps none.
+    side->pending += vk.link.off ? 0U : 1U; // In bus-off the controller holds no frame.
     if (speed != 0) {
         self.reset_said = false;
         self.moved_us = vk.now_us;
@@ -332,7 +332,7 @@ static void hash(uint64_t value) {
 void judge_call(const iw_can_frame_t *first, unsigned count) {
     const int16_t speed = (int16_t)(first->data[1] << 8 | first->data[2]);
     if (speed != 0 && (count != IW_SIDES || first->id != 266U)) {
-        judge_break(5, "%d mm/s for one wheel in a call of its own", speed);
+        judge_break(5, "%d mm/s for one wheel in a separate call", speed);
     }
 }
 
@@ -360,7 +360,7 @@ void judge_frame(const iw_can_frame_t *frame, bool accepted) {
     }
 }
 
-/// The zeros of a restart: how long they took.
+/// The time until the zeros of a restart.
 void judge_on_bus(const iw_can_frame_t *frame) {
     const unsigned number = (frame->id == 266U) ? IW_LEFT : IW_RIGHT;
     const bool zero = frame->data[1] == 0U && frame->data[2] == 0U;
@@ -378,7 +378,7 @@ void judge_on_bus(const iw_can_frame_t *frame) {
 
 void judge_foreign_on_bus(void) {
     self.foreign++;
-    self.owes = false; // Somebody else has the wheels.
+    self.owes = false; // Another master commands the wheels.
 }
 
 // ---- lives -------------------------------------------------------------------------------------------------------
@@ -428,7 +428,7 @@ void judge_death(bool in_order) {
         (self.side[IW_LEFT].speed != 0 || self.side[IW_RIGHT].speed != 0) && !judge_is_silent(WATCHDOG_US);
     self.killed_at = judge_phase();
     self.killed_us = vk.now_us;
-    // Killed again before its zeros had come out, it still owes them.
+    // A process that is killed before its zeros are on the bus still owes them.
     self.something = !in_order && ((self.something && self.frames == 0U) || (self.frames > 0U && !quiet));
     self.owes = !in_order && (moving || self.owes) && vk.now_us - self.fault_us > CALM_US && !vk.marker_failed;
     self.alive = false;

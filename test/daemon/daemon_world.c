@@ -16,14 +16,14 @@
 #define MS           1000U
 #define S            1000000U
 #define UPTIME_US    UINT64_C(600000000)
-#define PROVE_US     (25U * S) ///< A client must get its way within this, when all is healed.
+#define PROVE_US     (25U * S) ///< Time within which a client must be able to drive after all faults have ended.
 #define DRIVEN_US    (1U * S)
-#define REST_US      (14U * S) ///< And then all must come to rest.
+#define REST_US      (14U * S) ///< Time within which all must then come to standstill.
 #define WATCHDOG_US  S
 #define AIM_CALLS    400U
 #define START_CALLS  180U
 #define ARM_CALLS    40U
-#define AIM_US       (20U * S) ///< A phase that does not come.
+#define AIM_US       (20U * S) ///< Limit for a phase that does not come.
 #define LATE_DEFAULT 60U
 
 typedef enum { PART_CHAOS, PART_PROVE, PART_REST } part_t;
@@ -35,16 +35,16 @@ static struct {
     uint8_t port;
     size_t next;
     event_t fault[EV_KINDS];
-    iw_time_us_t until_us[EV_KINDS]; ///< 0: not going on.
+    iw_time_us_t until_us[EV_KINDS]; ///< 0: not active.
     iw_time_us_t trace_us;
-    iw_time_us_t fed_us; ///< The service manager heard last; IW_NEVER: the process is not ready.
+    iw_time_us_t fed_us; ///< Last message to the service manager; IW_NEVER: the process is not ready.
     iw_time_us_t fed_stolen_us;
     iw_time_us_t part_us;
     part_t part;
     bool proven;
-    bool troubled; ///< The bus, when last looked at.
+    bool troubled; ///< The bus had a fault at the last check.
     iw_time_us_t life_us;
-    phase_t aim; ///< Of the next kill.
+    phase_t aim; ///< Phase of the next kill.
     uint32_t kills;
     bool aimed;
 } world;
@@ -59,7 +59,7 @@ static bool traces(void) {
     return vk.now_us >= world.trace_us;
 }
 
-static void tell(const char *what, const char *more) {
+static void print_event(const char *what, const char *more) {
     if (traces()) {
         printf("  %11.6f s  %s%s\n", (double)vk.now_us / 1e6, what, more);
     }
@@ -107,7 +107,7 @@ static void disturb_bus(unsigned kind, bool on) {
     }
 }
 
-/// Begins or ends what lasts.
+/// Begins or ends a fault that lasts.
 static void switch_fault(unsigned kind, bool on) {
     const event_t *event = &world.fault[kind];
     switch (kind) {
@@ -138,7 +138,7 @@ static void switch_fault(unsigned kind, bool on) {
 
 static void end_fault(unsigned kind) {
     world.until_us[kind] = 0;
-    tell("end of: ", scenario_kind_name(kind));
+    print_event("end of: ", scenario_kind_name(kind));
     switch_fault(kind, false);
 }
 
@@ -177,13 +177,13 @@ static bool lasts(unsigned kind) {
 
 static void begin_event(const event_t *event) {
     world.result->events[event->kind]++;
-    tell(scenario_kind_name(event->kind), "");
+    print_event(scenario_kind_name(event->kind), "");
     if (!lasts(event->kind)) {
         happen_once(event);
         return;
     }
     if (world.until_us[event->kind] != 0U) {
-        end_fault(event->kind); // One of a kind at a time.
+        end_fault(event->kind); // Only one of a kind is active.
     }
     world.fault[event->kind] = *event;
     world.until_us[event->kind] = vk.now_us + event->span_us;
@@ -199,17 +199,17 @@ static void heal(void) {
     vk.stop_us = 0;
     sim_world_heal(&world.sim, vk.now_us);
     clients_all_gone();
-    vk_link_up(false); // What was swallowed is forgotten.
+    vk_link_up(false); // Swallowed frames are dropped.
     vk.link.up_at_us = vk.now_us + 20U * MS;
 }
 
 // ---- the gateway's frames ------------------------------------------------------------------------------------------
 
 void world_link_changed(bool up) {
-    tell(up ? "link up" : "link down", "");
+    print_event(up ? "link up" : "link down", "");
     judge_bus_lost();
     if (up) {
-        sim_world_bus_off(&world.sim, vk.now_us, false); // Set up anew, the controller takes part again.
+        sim_world_bus_off(&world.sim, vk.now_us, false); // After a new setup the controller takes part again.
         world.port = sim_world_connect(&world.sim);
     } else {
         judge_end("interface down", JUDGE_REACTION_US);
@@ -222,7 +222,7 @@ static void aim(void);
 void world_sent(const iw_can_frame_t *frame, bool accepted) {
     if (traces()) {
         printf("  %11.6f s    sends %u: %d mm/s%s\n", (double)vk.now_us / 1e6, (unsigned)frame->id,
-               (int16_t)(frame->data[1] << 8 | frame->data[2]), accepted ? "" : ", not taken");
+               (int16_t)(frame->data[1] << 8 | frame->data[2]), accepted ? "" : ", not accepted");
     }
     judge_frame(frame, accepted);
     aim();
@@ -273,7 +273,7 @@ void world_notified(const char *words, size_t size) {
 
 // ---- kills, one in each life ---------------------------------------------------------------------------------------
 
-/// In a call soon after its phase has begun; while arming, once it has had time to find the wheels at rest.
+/// Kills in a call soon after the phase has begun; while arming, after it has had time to find the wheels at standstill.
 static void aim(void) {
     const iw_time_us_t since_us = vk.now_us - world.life_us;
     const bool there = judge_phase() == world.aim && (world.aim != AT_ARMING || since_us > S / 2U);
@@ -286,7 +286,7 @@ static void aim(void) {
     world.aimed = true;
 }
 
-/// Somebody always wants to drive.
+/// There is always a client that wants to drive.
 static void keep_driving(void) {
     if (world.scenario->kills && clients_next_us() == IW_NEVER) {
         const uint8_t styles[] = {0, 1, 2, 4, 5};
@@ -345,21 +345,21 @@ static void next_part(void) {
     const event_t drives = {.span_us = PROVE_US, .a = 200, .b = 180, .kind = EV_DRIVER};
     switch (world.part++) {
     case PART_CHAOS:
-        tell("all is healed", "");
+        print_event("all faults have ended", "");
         heal();
         clients_start(&drives);
         world.part_us = vk.now_us + PROVE_US;
         break;
     case PART_PROVE:
         if (!world.proven) {
-            judge_break(9, "all is healed, but it cannot be driven");
+            judge_break(9, "all faults have ended, but the machine cannot be driven");
         }
         clients_all_gone();
         world.part_us = vk.now_us + REST_US;
         break;
     default:
         if (!judge_is_silent(S) || world.sim.pair.wheel[IW_LEFT].motion.speed_um_s != 0) {
-            judge_break(9, "nobody drives, but it does not come to rest");
+            judge_break(9, "no client drives, but standstill does not follow");
         }
         vk.end_us = vk.now_us;
         world.part_us = IW_NEVER;
@@ -378,14 +378,14 @@ static void run_faults(void) {
     }
 }
 
-/// The service manager kills who does not tell for a second that it is alive.
+/// The service manager kills a process that does not report for a second that it is alive.
 static void watch_over(void) {
     if (!world.scenario->watchdog || world.fed_us == IW_NEVER || vk.now_us - world.fed_us <= WATCHDOG_US) {
         return;
     }
-    tell("the watchdog of the service kills it", "");
+    print_event("the watchdog of the service kills it", "");
     if (vk.failed_us < world.fed_us && vk.stolen_us - world.fed_stolen_us < WATCHDOG_US / 4U) {
-        judge_break(13, "it runs, and has not told the service manager for a second");
+        judge_break(13, "the process runs, and has not reported to the service manager for a second");
     }
     world.fed_us = IW_NEVER;
     vk.doomed = true;
@@ -401,7 +401,7 @@ void world_run(void) {
     const bool troubled = vk.link.off || !vk.link.up || !sim_pair_acknowledges(&world.sim.pair) || world.sim.ack_off ||
                           world.sim.bus.stalled || world.until_us[EV_BABBLE] != 0U;
     if (troubled || world.troubled) {
-        judge_bus_fault(); // Until now, at least.
+        judge_bus_fault(); // The fault lasted at least until now.
     }
     world.troubled = troubled;
     judge_tick();
@@ -447,13 +447,13 @@ static void begin(const scenario_t *scenario, iw_time_us_t trace_from_us, result
     clients_begin(scenario->seed);
 }
 
-/// How a life ended, and whether it may have: for want of something before it had begun to wait, or because it was asked to.
+/// Judges the end of a life. The process may end for lack of a resource before it has begun to wait, or on request.
 static void judge_ended(vk_end_t end, bool waited, bool asked) {
     const bool wanting = vk.no_descriptors || vk.failed_us >= world.life_us;
     judge_death(end == VK_EXITED && vk.exit_code == 0);
-    tell("process ended", (end == VK_EXITED) ? " by itself" : "");
+    print_event("process ended", (end == VK_EXITED) ? " on its own" : "");
     if (end == VK_EXITED && !asked && (waited || !wanting)) {
-        judge_break(12, "it ended by itself with status %d", vk.exit_code);
+        judge_break(12, "the process ended on its own with status %d", vk.exit_code);
     }
 }
 
@@ -462,7 +462,7 @@ static void prepare_life(void) {
     world.fed_us = IW_NEVER;
     world.aimed = false;
     world.aim = (phase_t)(world.kills % AT_PHASES);
-    tell("process starts", "");
+    print_event("process starts", "");
     judge_life();
     aim();
 }

@@ -49,11 +49,11 @@ typedef struct {
 vk_t vk;
 static vk_fd_t table[DESCRIPTORS];
 static set_t sets[SETS];
-static void *blocks[BLOCKS]; // What the life has allocated.
-static void *ring;           // What it has mapped, for its black box,
-static size_t ring_size;     // and how much.
+static void *blocks[BLOCKS]; // Allocations of this life.
+static void *ring;           // Its mapping for the black box,
+static size_t ring_size;     // and its size.
 static pid_t last_pid;
-static bool stealing; // The time that passes is not the process's.
+static bool stealing; // Passing time does not belong to the process.
 
 void vk_begin(uint64_t seed, iw_time_us_t now_us, const char *config) {
     vk = (vk_t){.now_us = now_us, .end_us = IW_NEVER};
@@ -72,7 +72,7 @@ static void die(void) {
     longjmp(vk.leave, 1);
 }
 
-/// The purge's process, and whatever else goes on beside the gateway in this machine.
+/// The process of the purge, and other activity next to the gateway in this machine.
 static void poll_link(void) {
     if (vk.now_us >= vk.link.down_at_us) {
         vk.link.down_at_us = IW_NEVER;
@@ -113,7 +113,7 @@ void vk_idle(iw_time_us_t for_us) {
     vk.doomed = false;
 }
 
-/// The process is ready and does not run.
+/// The process is ready but does not run.
 static void steal(iw_time_us_t until_us) {
     const iw_time_us_t from_us = vk.now_us;
     stealing = true;
@@ -170,7 +170,7 @@ long vk_done(long result) {
 
 vk_fd_t *vk_fd(int fd) {
     if (fd == -1) {
-        return &table[0]; // Of no kind: whatever is asked of it fails.
+        return &table[0]; // An entry without a kind: every call on it fails.
     }
     const bool known = fd >= 3 && fd < DESCRIPTORS && table[fd].kind != VK_FREE;
     if (!known) {
@@ -231,10 +231,10 @@ int __wrap_fcntl(int fd, int command, ...) {
 
 // ---- waiting -----------------------------------------------------------------------------------------------------
 
-static uint32_t ready_set(const set_t *set, struct epoll_event *events, int room) {
+static uint32_t ready_set(const set_t *set, struct epoll_event *events, int max) {
     const unsigned first = (set->count > 1U) ? sim_random_below(&vk.random, set->count) : 0U;
     int count = 0;
-    for (unsigned i = 0; i < set->count && count < room; i++) {
+    for (unsigned i = 0; i < set->count && count < max; i++) {
         const watched_t *watched = &set->watched[(first + i) % set->count];
         const uint32_t found = vk_ready(watched->fd) & (watched->event.events | EPOLLERR | EPOLLHUP);
         if (found != 0U) {
@@ -247,7 +247,7 @@ static uint32_t ready_set(const set_t *set, struct epoll_event *events, int room
 uint32_t vk_ready(int fd) {
     const vk_fd_t *entry = vk_fd(fd);
     switch (entry->kind) {
-    case VK_EPOLL: // Asked within another set: whether there is any.
+    case VK_EPOLL: // A set inside another set: true if an event waits.
         for (unsigned i = 0; i < sets[entry->number].count; i++) {
             const watched_t *watched = &sets[entry->number].watched[i];
             if ((vk_ready(watched->fd) & (watched->event.events | EPOLLERR | EPOLLHUP)) != 0U) {
@@ -306,31 +306,31 @@ int __wrap_epoll_ctl(int epoll, int operation, int fd, struct epoll_event *event
     return (int)vk_done(0);
 }
 
-static int wait_until(int epoll, struct epoll_event *events, int room, iw_time_us_t until_us) {
+static int wait_until(int epoll, struct epoll_event *events, int max, iw_time_us_t until_us) {
     static const int errors[] = {EINTR, 0};
     vk.waits++;
     if (!vk_call("epoll_wait", errors)) {
         return -1;
     }
     const set_t *set = &sets[vk_fd(epoll)->number];
-    uint32_t count = ready_set(set, events, room);
+    uint32_t count = ready_set(set, events, max);
     const bool waited = count == 0U;
     while (count == 0U && vk.now_us < until_us) {
         iw_time_us_t next_us = world_next_us();
         next_us = (vk.link.up_at_us < next_us) ? vk.link.up_at_us : next_us;
         next_us = (vk.link.down_at_us < next_us) ? vk.link.down_at_us : next_us;
         vk_pass((next_us < until_us) ? next_us : until_us);
-        count = ready_set(set, events, room);
+        count = ready_set(set, events, max);
     }
     if (waited && vk.late_us > 0U) {
         steal(vk.now_us + sim_random_below(&vk.random, vk.late_us));
-        count = ready_set(set, events, room);
+        count = ready_set(set, events, max);
     }
     return (int)vk_done((long)count);
 }
 
-int __wrap_epoll_wait(int epoll, struct epoll_event *events, int room, int timeout_ms) {
-    return wait_until(epoll, events, room, vk.now_us + (iw_time_us_t)((timeout_ms > 0) ? timeout_ms : 0) * 1000U);
+int __wrap_epoll_wait(int epoll, struct epoll_event *events, int max, int timeout_ms) {
+    return wait_until(epoll, events, max, vk.now_us + (iw_time_us_t)((timeout_ms > 0) ? timeout_ms : 0) * 1000U);
 }
 
 long __wrap_syscall(long number, ...) {
@@ -338,7 +338,7 @@ long __wrap_syscall(long number, ...) {
     va_start(arguments, number);
     const int epoll = va_arg(arguments, int);
     struct epoll_event *events = va_arg(arguments, struct epoll_event *);
-    const int room = va_arg(arguments, int);
+    const int max = va_arg(arguments, int);
     const struct __kernel_timespec *span = va_arg(arguments, const struct __kernel_timespec *);
     va_end(arguments);
     if (number != WAIT_CALL) {
@@ -347,12 +347,12 @@ long __wrap_syscall(long number, ...) {
     }
     const iw_time_us_t span_us =
         (span == NULL) ? 0U : (iw_time_us_t)span->tv_sec * US_PER_S + (iw_time_us_t)span->tv_nsec / 1000U;
-    return wait_until(epoll, events, room, (span == NULL) ? IW_NEVER : vk.now_us + span_us);
+    return wait_until(epoll, events, max, (span == NULL) ? IW_NEVER : vk.now_us + span_us);
 }
 
 int __wrap_poll(struct pollfd *entries, nfds_t count, int timeout_ms) {
     (void)vk_call("poll", NULL);
-    (void)timeout_ms; // Of the log only: it never waits.
+    (void)timeout_ms; // Only the log calls it, and never waits.
     for (nfds_t i = 0; i < count; i++) {
         entries[i].revents = entries[i].events;
     }
@@ -388,9 +388,9 @@ int __wrap_signalfd(int fd, const sigset_t *mask, int flags) {
 }
 
 ssize_t vk_read_signal(void *out, size_t size) {
-    const struct signalfd_siginfo told = {.ssi_signo = (uint32_t)vk.signal};
+    const struct signalfd_siginfo info = {.ssi_signo = (uint32_t)vk.signal};
     (void)vk_call("read", NULL);
-    memcpy(out, &told, size);
+    memcpy(out, &info, size);
     vk.signal = 0;
     return vk_done((long)size);
 }
@@ -421,7 +421,7 @@ pid_t __wrap_getpid(void) {
     return FIRST_PID;
 }
 
-/// The same in every run, and with no fault and no time of its own: the seeds that found something stay what they are.
+/// The result is the same in every run and consumes no fault and no time: so seeds that once found a fault still do.
 ssize_t __wrap_getrandom(void *out, size_t size, unsigned flags) {
     (void)flags;
     memset(out, 7, size);
@@ -435,13 +435,13 @@ uid_t __wrap_geteuid(void) {
 static bool is_child_of_pair(void) {
     for (int fd = 3; fd < DESCRIPTORS; fd++) {
         if (table[fd].kind == VK_CHILD && table[fd].number == 0) {
-            return true; // A pair whose process has not been made yet.
+            return true; // A pair whose process does not exist yet.
         }
     }
     return false;
 }
 
-/// The one that purges: takes the link down and up, if it may.
+/// The process that purges: it takes the link down and up, if it may.
 static void begin_purge(pid_t pid) {
     vk.link.child = pid;
     vk.link.child_status = vk.link.may_restart ? 0 : EPERM;
@@ -490,7 +490,7 @@ void *__wrap_calloc(size_t count, size_t size) {
             return block;
         }
     }
-    abort(); // More than the gateway has ever asked for.
+    abort(); // More blocks than the gateway ever allocates.
 }
 
 void __wrap_free(void *block) {
@@ -534,7 +534,7 @@ static void close_all(void) {
         __real_free(blocks[i]);
         blocks[i] = NULL;
     }
-    if (ring != NULL) { // Of who was killed: this process may have 65,000 of them.
+    if (ring != NULL) { // Unmap it after a kill: this process may have 65,000 mappings.
         (void)__wrap_munmap(ring, ring_size);
     }
     vk_forget_sockets();

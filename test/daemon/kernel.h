@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: MIT
-/// The Linux kernel as the gateway's process sees it, in virtual time: descriptors, files, sockets, a CAN interface, a GPIO line.
+/// The Linux kernel for the gateway's process, in virtual time: descriptors, files, sockets, a CAN interface, a GPIO line.
 ///
-/// The linker leads every system call of the gateway here (`--wrap`, list in CMakeLists.txt); its own objects run unchanged, `main` and
-/// all. One process lives at a time. Whatever it does takes virtual time only here, in a call, so that calls are all the instants
-/// at which anybody outside could tell one run from another; at each of them
+/// The linker leads every system call of the gateway here (`--wrap`, list in CMakeLists.txt); its own objects run unchanged, including
+/// `main`. One process lives at a time. All that it does takes virtual time only here, in a call, so calls are the only instants
+/// at which two runs can differ from outside. In each call
 ///
 /// - time passes, the outside world goes on (daemon_world.h), and the process may be stopped, or preempted
-/// - it may be killed, before the call takes effect or right after
+/// - the process may be killed, before or after the call takes effect
 /// - the call may fail, with an errno that its manual page names
 ///
-/// Child processes are not run: what they would do outside is played (the keeper finds no file and writes none, the black box's
-/// writer takes its orders, the one that purges takes the link down and up). There is one kernel, because libc has no context.
+/// Child processes do not run; their outside effects are simulated (the store process finds no file and writes none, the black box's
+/// writer accepts its orders, the purging process takes the link down and up). There is one kernel, because libc has no context.
 #ifndef DAEMON_KERNEL_H
 #define DAEMON_KERNEL_H
 
@@ -34,17 +34,17 @@
 /// How a life ended.
 typedef enum { VK_EXITED, VK_KILLED, VK_OVER } vk_end_t;
 
-/// A client's connection; its number stands for it.
+/// A client's connection; its number identifies it.
 typedef struct {
-    bool taken;      ///< In use by a client.
-    bool watches;    ///< To the socket for watchers.
+    bool used;       ///< In use by a client.
+    bool watches;    ///< Connected to the socket for watchers.
     bool waiting;    ///< Not accepted yet.
     bool shut;       ///< The client will send no more.
     bool client_end; ///< The client has closed.
     bool closed;     ///< The gateway has closed, or died.
     size_t in_length;
     size_t out_length;
-    uint64_t in_total; ///< Bytes that the gateway has taken.
+    uint64_t in_total; ///< Bytes that the gateway has read.
     char in[VK_IN_SIZE];
     char out[VK_OUT_SIZE];
 } vk_stream_t;
@@ -53,10 +53,10 @@ typedef struct {
     iw_time_us_t now_us;
     iw_time_us_t stolen_us;    ///< Time in which the process was ready and did not run, since the beginning.
     iw_time_us_t stop_us;      ///< Stopped until then.
-    iw_time_us_t suspended_us; ///< What CLOCK_MONOTONIC has not counted.
-    int64_t wall_off_us;       ///< Of the wall clock.
+    iw_time_us_t suspended_us; ///< Time that CLOCK_MONOTONIC has not counted.
+    int64_t wall_off_us;       ///< Offset of the wall clock.
     iw_time_us_t end_us;       ///< The life ends there as VK_OVER.
-    uint64_t calls;            ///< Of all lives.
+    uint64_t calls;            ///< Calls of all lives.
     uint64_t waits;            ///< Of these, waits of the loop.
     uint64_t failed;           ///< Of these, made to fail.
     uint64_t kill_at;          ///< The process dies in the call with this number; 0: in none.
@@ -64,10 +64,10 @@ typedef struct {
     bool doomed;               ///< It dies before it does anything else.
     iw_time_us_t failed_us;    ///< When a call was made to fail last.
     iw_time_us_t failed_stolen_us;
-    bool marker_failed;     ///< The last one upon the crash marker was.
+    bool marker_failed;     ///< The last call on the crash marker failed.
     uint32_t fail_permille; ///< Calls that fail.
-    uint32_t late_us;       ///< Each wake-up is late by up to this.
-    bool no_descriptors;    ///< None is left for anybody.
+    uint32_t late_us;       ///< Maximum delay of each wake-up.
+    bool no_descriptors;    ///< No descriptor is available.
     bool trace;
     sim_random_t random;
     int signal; ///< Pending, or 0.
@@ -78,20 +78,20 @@ typedef struct {
         bool off; ///< Bus-off.
         bool may_restart;
         int index;
-        int news;    ///< What the netlink socket for events has not told yet.
-        pid_t child; ///< That purges; 0: none.
+        int news;    ///< Events that the netlink socket has not reported yet.
+        pid_t child; ///< The process that purges; 0: none.
         iw_time_us_t down_at_us;
         iw_time_us_t up_at_us;
         int child_status;
     } link;
     struct {
         bool there;
-        int number; ///< Another after it was gone: who holds the one before reads nothing any more.
+        int number; ///< Changes after the chip was gone: a descriptor of the earlier chip reads nothing any more.
         bool pressed;
-        int edges; ///< Not read yet.
+        int edges; ///< Edges that were not read yet.
     } button;
     vk_stream_t stream[VK_STREAMS];
-    bool bound_drive; ///< Somebody listens.
+    bool bound_drive; ///< The socket is bound.
     bool bound_watch;
     bool alive;
     jmp_buf leave;
@@ -101,21 +101,21 @@ extern vk_t vk;
 
 void vk_begin(uint64_t seed, iw_time_us_t now_us, const char *config);
 
-/// Runs the gateway from `main` on until it ends, is killed, or time is over. Descriptors close; files and link stay.
+/// Runs the gateway from `main` until it ends, is killed, or the time is over. Its descriptors close; files and link stay.
 vk_end_t vk_live(void);
 
-/// No process lives for so long.
+/// Lets time pass without a process.
 void vk_idle(iw_time_us_t for_us);
 
-/// Time goes on to there with all that happens outside. In a call of the process only.
+/// Lets time pass until then, with all events outside. Only in a call of the process.
 void vk_pass(iw_time_us_t to_us);
 
-/// A client connects. Its number, or -1: nobody listens, or no room.
+/// Connects a client. Returns its number, or -1: no listener, or no free connection.
 int vk_connect(bool watches);
 
-/// A frame was on the bus; `echo`: it was the gateway's own.
+/// Puts a frame on the bus; `echo`: it is the gateway's own.
 void vk_deliver(const iw_can_frame_t *frame, bool echo);
-/// An error frame of these classes and, in byte 1, this state of the controller.
+/// Delivers an error frame of these classes and, in byte 1, this state of the controller.
 void vk_deliver_error(uint32_t classes, uint8_t state);
 
 void vk_link_up(bool up);
@@ -125,7 +125,7 @@ void vk_press(bool pressed);
 
 bool vk_file_exists(const char *path);
 
-/// A call fails, or might.
+/// A call fails, or may fail.
 void vk_note_failure(void);
 
 // For the parts of the kernel ---------------------------------------------------------------------------------------
@@ -137,7 +137,7 @@ typedef enum {
     VK_SIGNAL,
     VK_LISTENER,
     VK_STREAM,
-    VK_SOCKET, ///< Not bound to anything, or one whose messages nobody answers.
+    VK_SOCKET, ///< Not bound, or a socket whose messages have no receiver.
     VK_CAN,
     VK_NETLINK,
     VK_GPIO,
@@ -146,24 +146,24 @@ typedef enum {
 
 typedef struct {
     vk_kind_t kind;
-    int number;    ///< Of the file, the stream, the CAN socket, the epoll set; family of a socket.
-    size_t offset; ///< In a file.
+    int number;    ///< Number of the file, the stream, the CAN socket or the epoll set; family of a socket.
+    size_t offset; ///< Position in a file.
     bool locked;
-    bool events; ///< Of a netlink socket: it hears of changes.
+    bool events; ///< A netlink socket that receives changes.
     char name[96];
 } vk_fd_t;
 
 vk_fd_t *vk_fd(int fd);
-/// The error that waits at this CAN socket, and does not any more; 0: none.
+/// Returns and clears the pending error of this CAN socket; 0: none.
 int vk_take_can_error(int fd);
 
-/// Begins a call. False: it fails, errno is one of `errors` (ended by 0; NULL: it cannot).
+/// Begins a call. Returns false if it fails; errno is then one of `errors` (ended by 0; NULL: it cannot fail).
 bool vk_call(const char *name, const int *errors);
-/// Ends it.
+/// Ends the call.
 long vk_done(long result);
-/// As `vk_call` and a new descriptor. -1: it failed.
+/// As `vk_call`, with a new descriptor. Returns -1 if it failed.
 int vk_open_fd(const char *name, vk_kind_t kind, int number);
-/// True if something would be told; of what epoll knows.
+/// Returns the events that epoll would report.
 uint32_t vk_ready(int fd);
 uint32_t vk_ready_socket(const vk_fd_t *entry);
 void vk_close_socket(const vk_fd_t *entry);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Files of the virtual kernel, in memory; they outlive the gateway. And the GPIO line, as libgpiod 1.5 shows it.
+// Files of the virtual kernel, in memory; they outlive the gateway. And the GPIO line with the interface of libgpiod 1.5.
 #include "kernel.h"
 
 #include "wrapped.h"
@@ -18,7 +18,7 @@
 
 typedef struct {
     char path[PATH_SIZE]; ///< Empty: no file.
-    mode_t mode;          ///< With its kind.
+    mode_t mode;          ///< Mode and kind.
     ino_t inode;
     bool locked;
     size_t length;
@@ -27,7 +27,7 @@ typedef struct {
 
 static file_t files[FILES];
 static ino_t last_inode;
-static int current = -1; ///< The folder that the process stands in; -1: the root.
+static int current = -1; ///< Current folder of the process; -1: the root.
 
 static int find(const char *path) {
     for (int i = 0; i < FILES; i++) {
@@ -69,7 +69,7 @@ bool vk_file_exists(const char *path) {
     return find(path) >= 0;
 }
 
-/// As the kernel would from `folder`, AT_FDCWD or a descriptor.
+/// Resolves a path as the kernel does from `folder`, AT_FDCWD or a descriptor.
 static void resolve(int folder, const char *name, char out_path[PATH_SIZE]) {
     const int base = (folder == AT_FDCWD) ? current : vk_fd(folder)->number;
     const char *from = (base < 0) ? "" : files[base].path;
@@ -132,7 +132,7 @@ ssize_t __wrap_read(int fd, void *out, size_t size) {
     return vk_done((long)count);
 }
 
-/// To the log only, where nobody reads it; a full pipe takes a part.
+/// A write to the log only, which has no reader; a full pipe accepts a part.
 ssize_t __wrap_write(int fd, const void *bytes, size_t size) {
     static const int errors[] = {EAGAIN, EINTR, 0};
     (void)((fd > STDERR_FILENO) ? vk_fd(fd) : NULL);
@@ -150,7 +150,7 @@ ssize_t __wrap_pread(int fd, void *out, size_t size, off_t offset) {
     return vk_done((long)count);
 }
 
-/// A part of it may be all that is written when the process dies.
+/// When the process dies, only a part may be written.
 ssize_t __wrap_pwrite(int fd, const void *bytes, size_t size, off_t offset) {
     (void)vk_call("pwrite", NULL);
     file_t *file = &files[vk_fd(fd)->number];
@@ -167,7 +167,7 @@ int __wrap_ftruncate(int fd, off_t size) {
 
 int __wrap_flock(int fd, int operation) {
     (void)vk_call("flock", NULL);
-    (void)operation; // There is one gateway, and its lock ends with it.
+    (void)operation; // There is one gateway, and its lock ends with the process.
     (void)vk_fd(fd);
     return (int)vk_done(0);
 }
@@ -297,9 +297,9 @@ void vk_set_carrier(void) {
 
 static char chip; ///< The only one; and its line.
 static int line_fd = -1;
-static bool iterated; ///< The search over all chips has had it.
+static bool iterated; ///< The search over all chips has returned it.
 
-/// The chip that the line was requested of is there still.
+/// True if the chip of the requested line still exists.
 static bool is_line_alive(void) {
     return vk.button.there && line_fd >= 0 && vk_fd(line_fd)->number == vk.button.number;
 }
@@ -412,14 +412,14 @@ int gpiod_line_event_read_fd_multiple(int fd, struct gpiod_line_event *events, u
         errno = is_line_alive() ? EAGAIN : ENODEV;
         return -1;
     }
-    const int taken = (vk.button.edges < (int)count) ? vk.button.edges : (int)count;
-    vk.button.edges -= taken;
-    return (int)vk_done(taken);
+    const int read_count = (vk.button.edges < (int)count) ? vk.button.edges : (int)count;
+    vk.button.edges -= read_count;
+    return (int)vk_done(read_count);
 }
 
 void vk_press(bool pressed) {
     if (pressed != vk.button.pressed) {
-        vk.button.edges += (vk.button.edges < 16) ? 1 : 0; // The kernel holds no more.
+        vk.button.edges += (vk.button.edges < 16) ? 1 : 0; // The kernel buffers no more.
     }
     vk.button.pressed = pressed;
 }

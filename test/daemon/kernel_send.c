@@ -16,7 +16,7 @@ static iw_can_frame_t frame_in(const struct mmsghdr *message) {
     return frame;
 }
 
-/// The interface's queue takes one frame, and not the next.
+/// The interface's queue accepts one frame and refuses the next.
 static bool is_full_behind(unsigned sent) {
     const bool full = sent > 0U && vk.fail_permille > 0U && sim_random_below(&vk.random, 1000U) < vk.fail_permille;
     vk.failed += full ? 1U : 0U;
@@ -26,8 +26,8 @@ static bool is_full_behind(unsigned sent) {
     return full;
 }
 
-/// A signal is not looked at between two frames, so that no death comes there. The error of a later frame than the first
-/// is dropped, as by the kernel.
+/// The kernel delivers no signal between two frames, so the process does not die there. The error of a frame after the first
+/// is dropped, as in the kernel.
 int __wrap_sendmmsg(int fd, struct mmsghdr *messages, unsigned count, int flags) {
     static const int errors[] = {ENOBUFS, EAGAIN, EINTR, 0};
     const iw_can_frame_t first = frame_in(&messages[0]);
@@ -48,6 +48,6 @@ int __wrap_sendmmsg(int fd, struct mmsghdr *messages, unsigned count, int flags)
         }
         messages[sent].msg_len = sizeof(struct can_frame);
     }
-    errno = error; // Those who judge have looked at files since.
+    errno = error; // The judge has accessed files since.
     return (int)vk_done((sent > 0U) ? (long)sent : -1);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Sockets of the virtual kernel: clients' connections, the CAN interface with its netlink, the ends towards child processes.
+// Sockets of the virtual kernel: clients' connections, the CAN interface with its netlink, the sockets to child processes.
 #include "kernel.h"
 
 #include "daemon_world.h"
@@ -28,14 +28,14 @@
 #define OURS       0
 #define OTHERS     1
 #define NETLINKS   4
-#define NAME_ROLE  2 ///< A listener under an abstract name, beside those of VK_GATEWAY and VK_WATCHERS.
+#define NAME_ROLE  2 ///< A listener with an abstract name, besides those of VK_GATEWAY and VK_WATCHERS.
 #define BITRATE_HZ 1000000U
 #define SAMPLE     625U
 #define QUEUE      4U
 
 typedef struct {
     bool bound;
-    int error; ///< Told once: the interface went down, or away.
+    int error; ///< Reported once: the interface went down, or disappeared.
     int index;
     uint32_t dropped;
     unsigned first;
@@ -52,7 +52,7 @@ struct mnl_socket {
 
 static can_queue_t queues[2];
 static struct mnl_socket netlinks[NETLINKS];
-static unsigned pairs; ///< To children, in this life.
+static unsigned pairs; ///< Pairs to child processes, in this life.
 
 void vk_forget_sockets(void) {
     memset(queues, 0, sizeof queues);
@@ -60,7 +60,7 @@ void vk_forget_sockets(void) {
     pairs = 0;
     vk.bound_drive = vk.bound_watch = false;
     for (unsigned i = 0; i < VK_STREAMS; i++) {
-        vk.stream[i].closed = true; // Those that wait, too.
+        vk.stream[i].closed = true; // Waiting connections too.
     }
 }
 
@@ -72,9 +72,9 @@ int vk_connect(bool watches) {
     }
     for (int i = 0; i < (int)VK_STREAMS; i++) {
         vk_stream_t *stream = &vk.stream[i];
-        if (!stream->taken) {
+        if (!stream->used) {
             memset(stream, 0, offsetof(vk_stream_t, in));
-            stream->taken = stream->waiting = true;
+            stream->used = stream->waiting = true;
             stream->watches = watches;
             return i;
         }
@@ -92,7 +92,7 @@ static uint32_t ready_stream(const vk_stream_t *stream) {
 static vk_stream_t *next_waiting(bool watches) {
     for (unsigned i = 0; i < VK_STREAMS; i++) {
         vk_stream_t *stream = &vk.stream[i];
-        if (stream->taken && stream->waiting && !stream->closed && stream->watches == watches) {
+        if (stream->used && stream->waiting && !stream->closed && stream->watches == watches) {
             return stream;
         }
     }
@@ -136,8 +136,8 @@ static ssize_t give_stream(vk_stream_t *stream, const void *bytes, size_t size) 
         errno = EPIPE;
         return -1;
     }
-    const size_t room = VK_OUT_SIZE - stream->out_length;
-    size_t count = (size < room) ? size : room;
+    const size_t space = VK_OUT_SIZE - stream->out_length;
+    size_t count = (size < space) ? size : space;
     if (vk.fail_permille > 0U && count > 1U && sim_random_below(&vk.random, 8U) == 0U) {
         count = 1U + sim_random_below(&vk.random, (uint32_t)count - 1U);
     }
@@ -207,7 +207,7 @@ int __wrap_socket(int domain, int type, int protocol) {
     return (int)vk_done(vk_open_fd("socket", VK_SOCKET, domain));
 }
 
-/// The first pair is the keeper's, which finds no file.
+/// The first pair belongs to the store process, which finds no file.
 int __wrap_socketpair(int domain, int type, int protocol, int ends[2]) {
     (void)domain;
     (void)type;
@@ -258,7 +258,7 @@ int __wrap_bind(int fd, const struct sockaddr *address, socklen_t length) {
     return (int)vk_done((file < 0) ? -1 : 0);
 }
 
-/// Nobody answers anywhere.
+/// No receiver exists.
 int __wrap_connect(int fd, const struct sockaddr *address, socklen_t length) {
     (void)vk_call("connect", NULL);
     (void)vk_fd(fd);
@@ -276,8 +276,8 @@ int __wrap_getsockopt(int fd, int level, int name, void *out_value, socklen_t *l
         const struct ucred peer = {.pid = 2000 + vk_fd(fd)->number, .uid = VK_USER, .gid = VK_USER};
         memcpy(out_value, &peer, sizeof peer);
     } else {
-        const int room = (int)(CAN_ROOM * 780U);
-        memcpy(out_value, &room, sizeof room);
+        const int space = (int)(CAN_ROOM * 780U);
+        memcpy(out_value, &space, sizeof space);
     }
     return (int)vk_done(0);
 }
@@ -292,7 +292,7 @@ int __wrap_setsockopt(int fd, int level, int name, const void *value, socklen_t 
     return (int)vk_done(0);
 }
 
-/// What waits at a socket is told by the next call, before the frames that still wait; a send sends nothing then.
+/// The next call returns the pending error of a socket, before the frames that wait; a send then sends nothing.
 static int take_error(can_queue_t *queue) {
     const int error = queue->error;
     queue->error = 0;
@@ -486,17 +486,17 @@ int __wrap_recvmmsg(int fd, struct mmsghdr *messages, unsigned count, int flags,
     if (!vk_call("recvmmsg", errors)) {
         return -1;
     }
-    const int told = take_error(queue);
-    const int error = (told != 0) ? told : (queue->count == 0U) ? EAGAIN : 0;
+    const int pending = take_error(queue);
+    const int error = (pending != 0) ? pending : (queue->count == 0U) ? EAGAIN : 0;
     if (error != 0) {
         errno = error;
         return (int)vk_done(-1);
     }
-    unsigned taken = 0;
-    while (taken < count && queue->count > 0U) {
-        hand_over(queue, &messages[taken++]);
+    unsigned done = 0;
+    while (done < count && queue->count > 0U) {
+        hand_over(queue, &messages[done++]);
     }
-    return (int)vk_done((long)taken);
+    return (int)vk_done((long)done);
 }
 
 // ---- netlink -------------------------------------------------------------------------------------------------------

@@ -12,12 +12,13 @@
 static void usage(FILE *out) {
     (void)fputs(
         "usage: test_daemon [--seed N [--trace] [--events]] | [--first N] [--hours H] | --kills N [--first N]\n"
-        "Plays seeds through the gateway itself, main and loop and port, on a kernel in virtual time, and judges what "
-        "it "
-        "does from outside.\n"
-        "A seed that fails is made small and told as a timeline. --seed N plays one. --kills N kills one gateway after "
+        "Plays seeds through the gateway itself, main and loop and port, on a kernel in virtual time, and judges it "
+        "from "
+        "outside.\n"
+        "A seed that fails is made small and printed as a timeline. --seed N plays one. --kills N kills one gateway "
+        "after "
         "another, N in all,\n"
-        "in every phase of a drive, before or after the effect of a system call, and tells when zeros were on the "
+        "in every phase of a drive, before or after the effect of a system call, and prints when zeros were on the "
         "bus.\n"
         "--quick ends at the first seed that fails, which is not made small. The last line is `N passed, N failed, "
         "N skipped`.\n",
@@ -104,7 +105,7 @@ static void tell_kills(void) {
     }
 }
 
-/// The figures of docs/developer/verification.md.
+/// Prints the figures of docs/developer/verification.md.
 static int kill_many(uint64_t seed, uint32_t lives) {
     scenario_kills(&scenario, seed, lives);
     const verdict_t verdict = play(IW_NEVER);
@@ -129,8 +130,8 @@ typedef struct {
     bool quick;
 } options_t;
 
-/// How many words were understood; 0: none.
-static int take(options_t *options, const char *word, const char *value) {
+/// Returns the number of words that were understood; 0: none.
+static int parse(options_t *options, const char *word, const char *value) {
     const struct {
         const char *name;
         bool *value;
@@ -165,18 +166,19 @@ int main(int argc, char **argv) {
     (void)setenv("WATCHDOG_USEC", "1000000", 1);
     (void)unsetenv("WATCHDOG_PID");
     FILE *nowhere = fopen("/dev/null", "w");
-    stderr = (nowhere != NULL) ? nowhere : stderr; // Why a start failed is the gateway's to say, hundreds of times.
+    stderr = (nowhere != NULL) ? nowhere
+                               : stderr; // Without this, the gateway would print hundreds of reasons for failed starts.
     for (int i = 1; i < argc;) {
         if (strcmp(argv[i], "--help") == 0) {
             usage(stdout);
             return EXIT_SUCCESS;
         }
-        const int taken = take(&options, argv[i], (i + 1 < argc) ? argv[i + 1] : NULL);
-        if (taken == 0) {
+        const int used = parse(&options, argv[i], (i + 1 < argc) ? argv[i + 1] : NULL);
+        if (used == 0) {
             usage(stdout);
             return EXIT_USAGE;
         }
-        i += taken;
+        i += used;
     }
     if (options.one) {
         return play_one(options.seed, options.trace, options.events);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What happens in a scenario, drawn from its seed.
+// The events of a scenario, drawn from its seed.
 #include "daemon_world.h"
 
 #include "iwheel_sim/random.h"
@@ -9,7 +9,7 @@
 #define MS 1000U
 #define S  1000000U
 
-/// How an event of a kind is drawn. Spans are drawn so that short ones are as frequent as long ones.
+/// How an event of a kind is drawn. Spans are drawn so that short ones are as likely as long ones.
 typedef struct {
     const char *name;
     uint32_t weight;
@@ -33,11 +33,11 @@ static const draw_t draws[EV_KINDS] = {
     [EV_DOWN] = {"interface down", 2, 500, 2 * S, 0, 0},
     [EV_GONE] = {"interface deleted", 1, 1 * MS, 2 * S, 0, 0},
     [EV_BUS_OFF] = {"bus-off", 2, 1 * MS, 2 * S, 0, 0},
-    [EV_NO_ACK] = {"nobody acknowledges", 1, 1 * MS, 2 * S, 0, 0},
-    [EV_STALL] = {"bus takes no frame", 2, 1 * MS, 1 * S, 0, 0},
+    [EV_NO_ACK] = {"no acknowledgement", 1, 1 * MS, 2 * S, 0, 0},
+    [EV_STALL] = {"bus accepts no frame", 2, 1 * MS, 1 * S, 0, 0},
     [EV_POWER] = {"wheels without power", 1, 20 * MS, 3 * S, 0, 0},
     [EV_FOREIGN] = {"second master", 1, 1 * MS, 1 * S, 0, 0},
-    [EV_MUTE] = {"wheel silent", 2, 5 * MS, 2 * S, 0, 0},
+    [EV_MUTE] = {"wheel offline", 2, 5 * MS, 2 * S, 0, 0},
     [EV_REBOOT] = {"wheel reboots", 1, 0, 0, 0, 0},
     [EV_BABBLE] = {"node babbles", 1, 10 * MS, 1 * S, 0, 2047},
     [EV_DRIVER] = {"client drives", 14, 1 * S, 12 * S, -1000, 1000},
@@ -122,7 +122,7 @@ void scenario_draw(scenario_t *self, uint64_t seed) {
     self->chaos_us = at_us + 1U * S;
 }
 
-/// Drives of all kinds behind each other; who is killed is decided call by call (daemon_world.c).
+/// Draws drives of all kinds one after the other; the process is killed in calls that daemon_world.c selects.
 void scenario_kills(scenario_t *self, uint64_t seed, uint32_t lives) {
     sim_random_t random;
     memset(self, 0, sizeof *self);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-/// The calls that the linker leads into the virtual kernel, as it names them. Each means what its manual page says; only what the
-/// gateway uses of it is there.
+/// The calls that the linker leads into the virtual kernel, with the linker's names. Each behaves as in its manual page, as far as the
+/// gateway uses it.
 #ifndef DAEMON_WRAPPED_H
 #define DAEMON_WRAPPED_H
 
@@ -16,17 +16,17 @@
 struct mnl_socket;
 typedef void (*vk_handler_t)(int);
 
-/// The user that the gateway runs as; its folders are his.
+/// The user that runs the gateway and owns its folders.
 #define VK_USER 999U
 
-/// The gateway's `main`, by another name.
+/// The gateway's `main` under another name.
 int gateway_main(int argc, char **argv);
 
 int __wrap_close(int fd);
 int __wrap_fcntl(int fd, int command, ...);
 int __wrap_epoll_create1(int flags);
 int __wrap_epoll_ctl(int epoll, int operation, int fd, struct epoll_event *event);
-int __wrap_epoll_wait(int epoll, struct epoll_event *events, int room, int timeout_ms);
+int __wrap_epoll_wait(int epoll, struct epoll_event *events, int max, int timeout_ms);
 long __wrap_syscall(long number, ...);
 int __wrap_poll(struct pollfd *entries, nfds_t count, int timeout_ms);
 int __wrap_clock_gettime(clockid_t clock, struct timespec *out_time);

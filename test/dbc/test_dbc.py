@@ -45,7 +45,7 @@ UNIT_OF_SUFFIX = {
     "_raw": None,
     "_type": None,
 }
-# Where the DBC says more than the C codec, which does not know the unit of a force.
+# Names of fields whose unit the DBC defines: the C codec does not know the unit of a force.
 DBC_NAME = {
     (266, "type"): "setpoint_type",
     (298, "type"): "setpoint_type",
@@ -146,10 +146,10 @@ class TestDatabase(unittest.TestCase):
             message = DATABASE.get_message_by_frame_id(int(can_id))
             self.assertEqual(f"{side}{kind}", message.name.lower())
             self.assertEqual(int(length), message.length)
-            # Of a setpoint the core has the longest period allowed, the DBC the gateway's own.
+            # The core's row of a setpoint contains the longest permitted period; the DBC contains the gateway's default.
             self.assertTrue(message.cycle_time == int(period_ms) or (kind == "setpoint" and message.cycle_time < int(period_ms)))
 
-    def test_every_message_tells_its_number_in_hexadecimal(self):
+    def test_every_message_has_its_number_in_hexadecimal(self):
         for message in DATABASE.messages:
             self.assertIn(f"0x{message.frame_id:03X}", message.comment)
 
@@ -174,7 +174,7 @@ class TestDatabase(unittest.TestCase):
         with self.assertRaises(cantools.database.EncodeError):
             message.encode(values)
 
-    def test_force_units_are_those_of_the_document_and_marked_assumed(self):
+    def test_force_units_match_the_document_and_are_marked_assumed(self):
         for name, unit in (("LeftForce", "cN"), ("RightForce", "dN")):
             signal = DATABASE.get_message_by_name(name).get_signal_by_name(f"normal_force_{unit}")
             self.assertEqual(unit, signal.unit)

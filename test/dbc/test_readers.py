@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Other people's programs read a recording of the black box as it is, and cantools with share/iwheel.dbc sees in it what `iwheelctl decode` sees."""
+"""Third-party programs read an unmodified recording of the black box. cantools with share/iwheel.dbc decodes the same values as `iwheelctl decode`."""
 
 import csv
 import io
@@ -21,7 +21,7 @@ ROOT = Path(__file__).resolve().parents[2]
 RECORDING = ROOT / "test/recordings/estop.log"
 LINES = RECORDING.read_text(encoding="ascii").splitlines()
 PROGRAM = os.path.join(os.environ["IWHEEL_BUILD"], "app/ctl/iwheelctl")
-# The decoder's columns beside the DBC's names.
+# The columns of `iwheelctl decode` whose names differ from those in the DBC.
 COLUMN = {
     "speed_mm_s": "setpoint_speed_mm_s",
     "current_mA": "setpoint_current_mA",
@@ -64,7 +64,7 @@ class Readers(unittest.TestCase):
                 compared += 1
         self.assertGreater(compared, 2 * len(LINES))
 
-    def test_what_python_can_writes_is_read_back(self):
+    def test_file_of_python_can_is_read_back(self):
         path = os.path.join(tempfile.mkdtemp(), "written.log")
         with can.CanutilsLogWriter(path, channel="vcan0") as writer:
             for i, more in enumerate(({}, {"is_extended_id": True}, {"is_remote_frame": True, "dlc": 5}, {"is_fd": True, "data": bytes(12)}, {"is_rx": False})):

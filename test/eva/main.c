@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-/// The core among strangers, for Frama-C's Eva (`./check eva`): any configuration that `iw_config_check` lets pass, then,
+/// The core with arbitrary input, for Frama-C's Eva (`./check eva`): any configuration that `iw_config_check` accepts, then,
 /// without end and in any order, steps and requests with any argument that their contracts allow, over a HAL whose functions
 /// return anything and whose frames are any bytes.
 ///
-/// Eva computes a superset of all values that every object can have at every statement of every such run. What it cannot
-/// exclude of undefined behaviour is an alarm, and no alarm may stay: docs/developer/static.md.
+/// Eva computes a superset of all values that every object can have at every statement of every such run. Undefined behaviour
+/// that it cannot exclude is an alarm, and no alarm may stay: docs/developer/static.md.
 #include "iwheel/bit_timing.h"
 #include "iwheel/gateway.h"
 #include "iwheel/observation.h"
@@ -93,8 +93,8 @@ static const iw_hal_t hal = {send_frames, receive_frame, bus_state, purge, estop
 
 // ---- the configuration ----
 
-/// The ratio lies within 1..100. Eva does not relate two variables: so class after class of `gear_per`, each with the
-/// `gear_turns` that go with it.
+/// The ratio is within 1..100. Eva does not relate two variables, so the classes of `gear_per` are analysed one by one, each with
+/// the matching `gear_turns`.
 static void any_gear(iw_config_t *out_config) {
     const iw_config_range_t per = iw_config_range(IW_CONFIG_GEAR_PER);
     const iw_config_range_t turns = iw_config_range(IW_CONFIG_GEAR_TURNS);
@@ -132,7 +132,7 @@ static void any_config(iw_config_t *out_config) {
     out_config->wheel_lag_ms = any_within(IW_CONFIG_WHEEL_LAG);
     out_config->max_yaw_mrad_s = any_within(IW_CONFIG_MAX_YAW);
     out_config->yaw_accel_mrad_s2 = any_within(IW_CONFIG_YAW_ACCEL);
-    // 0: not set. Nothing between it and the range is permitted, and nothing there must go wrong either.
+    // 0: not set. Values between 0 and the range are not permitted, and must not cause undefined behaviour either.
     out_config->track_mm = (uint16_t)Frama_C_unsigned_int_interval(0U, iw_config_range(IW_CONFIG_TRACK).max);
     out_config->radius_mm = any_within(IW_CONFIG_RADIUS);
     any_gear(out_config);
@@ -229,8 +229,8 @@ static void operate(iw_side_t side) {
     }
 }
 
-/// What a program shows of the wheels.
-static void look(iw_side_t side) {
+/// Functions that a program calls to show the wheels.
+static void observe(iw_side_t side) {
     iw_snapshot_t seen;
     (void)iw_force_validity(&gateway.force[side], now_us);
     (void)iw_force_raw_mN(&gateway.force[side]);
@@ -248,9 +248,9 @@ static void look(iw_side_t side) {
     (void)iw_assumption_entry(&gateway.assumptions, IW_ASSUMPTION_DLC);
 }
 
-/// What does not belong to the loop of a gateway: the codec's other direction, the bit timing.
+/// Functions outside the loop of a gateway: the codec's other direction, the bit timing.
 static void calculate(void) {
-    iw_codec_wheel_t told[IW_SIDES];
+    iw_codec_wheel_t messages[IW_SIDES];
     iw_can_frame_t frame;
     iw_bit_timing_t timing = {any_u16(), any_u16(), any_u16()};
     const iw_bit_timing_limits_t limits = {any_u16(), any_u16(), any_u16(), any_u16(), any_u16()};
@@ -260,11 +260,11 @@ static void calculate(void) {
     (void)iw_codec_find(any_u32());
     const iw_codec_kind_t kind = (iw_codec_kind_t)Frama_C_interval(IW_CODEC_SPEED, IW_CODEC_POSE);
     const iw_side_t side = (iw_side_t)Frama_C_interval(IW_LEFT, IW_RIGHT);
-    Frama_C_make_unknown((char *)told, sizeof told);
+    Frama_C_make_unknown((char *)messages, sizeof messages);
     (void)iw_codec_name(kind);
-    (void)iw_codec_encode(kind, side, &told[side], &frame);
+    (void)iw_codec_encode(kind, side, &messages[side], &frame);
     (void)receive_frame(NULL, &frame);
-    (void)iw_codec_decode(&frame, told);
+    (void)iw_codec_decode(&frame, messages);
 }
 
 static void event(void) {
@@ -280,12 +280,12 @@ static void event(void) {
         operate(any_bool() ? IW_LEFT : IW_RIGHT);
         break;
     default:
-        look(any_bool() ? IW_LEFT : IW_RIGHT);
+        observe(any_bool() ? IW_LEFT : IW_RIGHT);
         break;
     }
 }
 
-/// Without end. States are joined here, after every event: see `-eva-slevel-function` in test/eva/run.
+/// Endless loop. States are joined here, after every event: see `-eva-slevel-function` in test/eva/run.
 static void live(void) {
     //@ loop widen_hints HINTS;
     while (any_bool()) {

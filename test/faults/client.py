@@ -13,7 +13,7 @@ TIMEOUT_S = 60
 
 
 def judge(applied, tests, folder):
-    """The first test that fails, or None. `tests`: a file of python/tests without its ending, or a class or a test of it."""
+    """The first failed test, or None. `tests`: a file of python/tests without its ending, or a class or a test in it."""
     shutil.copytree(ROOT / "python", folder / "python", ignore=shutil.ignore_patterns("__pycache__"), dirs_exist_ok=True)
     for name in ("build", "scripts", "share", "test"):
         if not (folder / name).exists():

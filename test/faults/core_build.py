@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Copies of the core with one change each, and what judges them: the unit tests, the simulation, all orders of events.
+"""Copies of the core with one change each, and their judges: the unit tests, the simulation, all orders of events.
 
-The core is a shared library here, so that a change costs the compilation of one file: the judges are linked once and find
-the changed library through LD_LIBRARY_PATH. The tree itself is never touched.
+The core is a shared library here, so a change costs the compilation of one file: the judges are linked once and find the
+changed library through LD_LIBRARY_PATH. The tree itself never changes.
 """
 
 import os
@@ -25,21 +25,21 @@ from core_tests import core_tests
 CORE = ROOT / "core/src"
 INCLUDE = [f"-I{ROOT / path}" for path in ("core/include", "core/src", "app/sim/model/include", "test/sim", "test/support")]
 WHICH = "which.c"
-# A judge is stopped when it has used so many times the processor time it needs with the core as it is, and so many seconds more:
-# far beyond what a busy machine can add, so that only what does not end is taken for an endless loop.
+# Limit of a judge's processor time: TIMES its time with the unchanged core, plus MORE_S. A busy machine adds far less, so a judge
+# that exceeds the limit is in an endless loop.
 TIMES, MORE_S, UNMEASURED_S = 10, 3, 600
-WAIT_S = 3600  # By the clock: who waits for ever uses no processor.
+WAIT_S = 3600  # Wall-clock limit: a program that waits forever uses no processor time.
 OUTPUT_MAX = 64 << 20
 GCC = ["ccache", "gcc"] if shutil.which("ccache") else ["gcc"]
-# A change that reads or writes beyond an array must not pass unseen: it ends the program.
+# A change that reads or writes beyond an array ends the program.
 BOUNDS = ("-fsanitize=bounds-strict,shift,signed-integer-overflow", "-fsanitize-undefined-trap-on-error")
-# What is read without having been written is the same in every run.
+# Uninitialised variables have the same value in every run.
 PATTERN = ("-ftrivial-auto-var-init=pattern",)
-# By these signals a program ends because of what was changed; any other is somebody else's doing and proves nothing.
+# These signals are caused by the change under test; any other signal comes from outside and proves nothing.
 CRASHES = {signal.SIGILL, signal.SIGTRAP, signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGABRT, signal.SIGPIPE}
 NUMBER = "IWHEEL_MUTANT"
 ENDLESS = {signal.SIGXCPU, signal.SIGXFSZ, signal.SIGALRM}
-# Unit tests that sweep every value come last: most changes are caught long before them.
+# Unit tests that sweep every value run last: most changes fail an earlier one.
 SLOW = ("confirmation", "gateway_core_walk", "bit_timing", "codec_sweep", "envelope_scheduler")
 
 
@@ -56,34 +56,34 @@ class Run(NamedTuple):
 
     @property
     def how(self):
-        """Without its own words: how it ended."""
+        """How it ended, without its output."""
         if self.endless:
             return "does not end"
         return f"ends by {signal.Signals(-self.status).name}" if self.status < 0 else f"ends with status {self.status}"
 
 
 class Core(NamedTuple):
-    """A changed core: where its library is, and which of the changes that are in it is in force (test/mutation/schemata.py)."""
+    """A changed core: the folder of its library, and the number of the enabled change in it (test/mutation/schemata.py)."""
 
     folder: Path
     number: int = 0
-    has_judges: bool = False  # Its headers are changed, so that who includes them must be built for it, into its folder.
+    has_judges: bool = False  # Its headers are changed, so judges that include them are built for it, into its folder.
 
 
 def play(command, core, limit_s):
-    """Runs a program with that core. Raises if it was ended from outside."""
+    """Runs a program with that core. Raises if another process ended it."""
 
     def limit():
         resource.setrlimit(resource.RLIMIT_CPU, (limit_s, limit_s + 5))
         resource.setrlimit(resource.RLIMIT_FSIZE, (OUTPUT_MAX, OUTPUT_MAX))
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-        signal.alarm(WAIT_S)  # Kept through exec.
+        signal.alarm(WAIT_S)  # exec preserves the alarm.
 
-    with tempfile.TemporaryFile() as said:
+    with tempfile.TemporaryFile() as output:
         child = subprocess.Popen(
             [str(word) for word in command],
             stdin=subprocess.DEVNULL,
-            stdout=said,
+            stdout=output,
             stderr=subprocess.DEVNULL,
             cwd=core.folder,
             env={**os.environ, "LD_LIBRARY_PATH": str(core.folder), NUMBER: str(core.number)},
@@ -91,26 +91,26 @@ def play(command, core, limit_s):
         )
         _, status, usage = os.wait4(child.pid, 0)
         child.returncode = os.waitstatus_to_exitcode(status)
-        said.seek(0)
-        run = Run(child.returncode, said.read().decode(errors="replace"), usage.ru_utime + usage.ru_stime)
+        output.seek(0)
+        run = Run(child.returncode, output.read().decode(errors="replace"), usage.ru_utime + usage.ru_stime)
     if run.status < 0 and -run.status not in CRASHES | ENDLESS:
-        raise RuntimeError(f"{command[0]} was ended from outside: {run.how}")
+        raise RuntimeError(f"{command[0]} was ended by another process: {run.how}")
     return run
 
 
 def limit_s(unchanged):
-    """Seconds of processor time for what took so much as it is."""
+    """The limit in seconds of processor time, from the run with the unchanged core."""
     return int(TIMES * unchanged.cpu_s) + MORE_S
 
 
 def compile_file(source, out, *flags, gcc=("gcc",), include=tuple(INCLUDE)):
-    """None, or what the compiler said."""
+    """None, or the compiler's output."""
     done = subprocess.run([*gcc, "-std=gnu11", "-w", *flags, *include, "-c", source, "-o", out], capture_output=True, text=True, check=False)
     return None if done.returncode == 0 else done.stderr
 
 
 class Judges:
-    """The judges, built in `work`, and the unchanged core beside them."""
+    """The judges, built in `work`, and the unchanged core next to them."""
 
     def __init__(self, work, unity, jobs):
         self.work, self.jobs = Path(work), jobs
@@ -132,19 +132,19 @@ class Judges:
 
     def compile_core(self, source):
         self.objects[source.name] = self.clean.folder / (source.stem + ".o")
-        said = compile_file(source, self.objects[source.name], "-O1", "-fPIC", gcc=GCC)
-        if said:
-            raise RuntimeError(said)
+        output = compile_file(source, self.objects[source.name], "-O1", "-fPIC", gcc=GCC)
+        if output:
+            raise RuntimeError(output)
 
     def compile_other(self, source, folder=None, flags=("-O2",), include=tuple(INCLUDE)):
         out = (folder or self.work) / f"{source.parent.name}_{source.stem}.o"
-        said = compile_file(source, out, *flags, *PATTERN, f"-I{self.unity}", "-DUNITY_SUPPORT_64", gcc=GCC, include=include)
-        if said:
-            raise RuntimeError(said)
+        output = compile_file(source, out, *flags, *PATTERN, f"-I{self.unity}", "-DUNITY_SUPPORT_64", gcc=GCC, include=include)
+        if output:
+            raise RuntimeError(output)
         return out
 
     def build(self, name, objects, folder=None):
-        """The judge of that name; in `folder` for the library that is there, else for the core as it is."""
+        """Links the judge of that name: in `folder` with the library there, otherwise with the unchanged core."""
         subprocess.run(["gcc", *objects, f"-L{folder or self.clean.folder}", "-liwheel", "-o", (folder or self.work) / name], check=True)
 
     def link(self, folder, replaced):
@@ -152,21 +152,21 @@ class Judges:
         subprocess.run(["ld", "-shared", *objects, "-o", folder / "libiwheel.so"], check=True)
 
     def change(self, name, file, text):
-        """(a core in which `file` has that text, None), or (None, what the compiler said)."""
+        """(a core in which `file` has that text, None), or (None, the compiler's output)."""
         folder = self.work / "changed" / name
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(parents=True)
         (folder / file).write_text(text)
-        said = compile_file(folder / file, folder / "changed.o", "-O0", "-fPIC", *BOUNDS, *PATTERN)
-        if said and "error:" not in said:
-            raise RuntimeError(said)
-        if said:
-            return None, said
+        output = compile_file(folder / file, folder / "changed.o", "-O0", "-fPIC", *BOUNDS, *PATTERN)
+        if output and "error:" not in output:
+            raise RuntimeError(output)
+        if output:
+            return None, output
         self.link(folder, {file: folder / "changed.o"})
         return Core(folder), None
 
     def change_headers(self, name, texts, which):
-        """As `change`, but headers of the core, {path: text}; `which` is a source of its own in the library."""
+        """As `change`, but for headers of the core, {path: text}; `which` is an additional source of the library."""
         folder = self.work / "changed" / name
         shutil.rmtree(folder, ignore_errors=True)
         shutil.copytree(ROOT / "core", folder / "core")
@@ -175,25 +175,25 @@ class Judges:
         (folder / WHICH).write_text(which)
         (folder / "all.c").write_text("".join(f'#include "{path.name}"\n' for path in texts))
         folders = {folder / path.relative_to(ROOT).parent for path in texts}
-        said = compile_file(folder / "all.c", folder / "all.o", include=[*(f"-I{path}" for path in folders), *self.include(folder)])
-        if said:
-            return None, said
+        output = compile_file(folder / "all.c", folder / "all.o", include=[*(f"-I{path}" for path in folders), *self.include(folder)])
+        if output:
+            return None, output
         replaced = {}
         for source in [*sorted((folder / "core/src").glob("*.c")), folder / WHICH]:
             replaced[source.name] = folder / f"{source.stem}.o"
-            said = compile_file(source, replaced[source.name], "-O1", "-fPIC", *BOUNDS, *PATTERN, include=self.include(folder))
-            if said:
-                raise RuntimeError(said)
+            output = compile_file(source, replaced[source.name], "-O1", "-fPIC", *BOUNDS, *PATTERN, include=self.include(folder))
+            if output:
+                raise RuntimeError(output)
         self.link(folder, replaced)
         return Core(folder, has_judges=True), None
 
     @staticmethod
     def include(folder):
-        """What is included where the core's headers are changed."""
+        """The include options for changed headers of the core."""
         return [word.replace(f"-I{ROOT}/core/", f"-I{folder}/core/") for word in INCLUDE]
 
     def judge_of(self, core, program):
-        """Where it is; with changed headers it is built when it is first asked for. Held: the lock."""
+        """The path of the judge; with changed headers it is built at its first use. The caller holds the lock."""
         folder = core.folder if core.has_judges else self.work
         if not (folder / program).exists():
             objects = [self.compile_other(path, folder, ("-O1", *BOUNDS), self.include(folder)) for path in self.programs[program]]
@@ -201,12 +201,12 @@ class Judges:
         return folder / program
 
     def unchanged(self, command, core):
-        """How it ends with the core as it is, played once. Held: the lock."""
+        """The run with the unchanged core, made once. The caller holds the lock."""
         if command not in self.as_it_is:
             clean = core._replace(number=0) if core.has_judges else self.clean
             done = play(command, clean, UNMEASURED_S)
             if done.status != 0 and core.has_judges:
-                raise RuntimeError(f"{command[0].name}, built for changed headers of which none is in force, {done.how}")
+                raise RuntimeError(f"{command[0].name}, built with changed headers of which none is enabled, {done.how}")
             self.as_it_is[command] = done
         return self.as_it_is[command]
 
@@ -226,12 +226,12 @@ class Judges:
         return None
 
     def unit(self, core, first=()):
-        """The first unit test that fails, or None. `first`: what to begin with."""
+        """The first failed unit test, or None. `first`: names to begin with."""
         found = self.failing(core, sorted(self.tests, key=lambda name: (name in SLOW, not any(part in name for part in first), name)))
         return found and (found[1] or f"unit_{found[0]} {found[2].how}")
 
     def sim(self, core, hours=5):
-        """What the swarm finds, or None."""
+        """The finding of the swarm, or None."""
         done = self.run(core, "test_sim", "--quick", "--hours", hours)
         if done.status == 0:
             return None
@@ -239,7 +239,7 @@ class Judges:
         return f"rule {found[2]}, seed {found[1]}: {found[3]}" if found else done.how
 
     def orders(self, core, length=3):
-        """What the enumeration of all orders finds, or None."""
+        """The finding of the enumeration of all orders, or None."""
         done = self.run(core, "test_orders", "--length", length)
         if done.status == 0:
             return None
@@ -249,6 +249,6 @@ class Judges:
 
 
 def find_unity(build):
-    """Unity's folder, as CMake found it; None if it is installed without sources."""
+    """Unity's folder that CMake found; None if it is installed without sources."""
     path = Path(build) / "test/target/unity_folder"
     return path.read_text().strip() or None if path.exists() else None

@@ -57,7 +57,7 @@ def must(command):
 
 
 def judge(work, applied, folder, image, scenario):
-    """What the scenario finds, or None. `work`: what test/target has built."""
+    """The finding of the scenario, or None. `work`: the folder that test/target has built."""
     work = Path(work).resolve()
     shutil.copytree(PORT, folder)
     for place in (APPLICATION, SERVER):

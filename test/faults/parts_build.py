@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Unit tests with one file of what they test changed.
+"""Builds unit tests with one changed file.
 
-The default build tells how each file is compiled and each program linked. A change costs the compilation of that one file, as it is
-compiled for the program that judges, and one link: the changed object stands before the libraries, or in the place of the program's
-own. The tree and the build are never touched.
+The default build shows how each file is compiled and each program linked. A change costs one compilation of that file, with the
+options of the judging program, and one link: the changed object is linked before the libraries, or instead of the program's own
+object. The tree and the build never change.
 """
 
 import json
@@ -36,14 +36,14 @@ class Parts:
             self.commands.setdefault(Path(entry["file"]), {})[folder / output_of(words)] = (folder, words)
 
     def link_of(self, program):
-        """(the folder it is linked in, the words of the command)"""
+        """(the folder of the link command, the words of the command)"""
         found = list(self.build.glob(f"*/*/CMakeFiles/{program}.dir/link.txt"))
         if len(found) != 1:
             raise RuntimeError(f"{self.build} has {len(found)} programs {program}: build it")
         return found[0].parent.parent.parent, shlex.split(found[0].read_text())
 
     def compile(self, source, changed, inside, flags=("-O1",)):
-        """(the object it replaces, the changed one, None or what the compiler said). `inside`: what the program is linked from by name."""
+        """(the object that is replaced, the changed object, None or the compiler's output). `inside`: the objects that the program names in its link."""
         commands = self.commands.get(source)
         if not commands:
             raise RuntimeError(f"{source} is not compiled in {self.build}")
@@ -52,19 +52,19 @@ class Parts:
         out = changed.parent / f"{list(commands).index(chosen)}.o"
         if out.exists():
             return chosen, out, None
-        kept = [word for word in words if not word.startswith("-W") and word not in (str(source), output_of(words), "-o", "-c", "-g", "-O2")]
-        command = [*kept, *flags, "-w", "-iquote", str(source.parent), "-c", str(changed), "-o", str(out)]
+        options = [word for word in words if not word.startswith("-W") and word not in (str(source), output_of(words), "-o", "-c", "-g", "-O2")]
+        command = [*options, *flags, "-w", "-iquote", str(source.parent), "-c", str(changed), "-o", str(out)]
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
         return chosen, out, None if done.returncode == 0 else done.stderr
 
     def link(self, program, source, changed, out, flags=("-O1",)):
-        """None, or why that program cannot be had with the changed file."""
+        """None, or why the program cannot be built with the changed file."""
         folder, words = self.link_of(program)
         place = {word: Path(os.path.normpath(folder / word)) for word in words if word.endswith(".o")}
         inside = set(place.values())
-        chosen, changed_object, said = self.compile(source, changed, inside, flags)
-        if said:
-            return f"does not compile: {said}"
+        chosen, changed_object, output = self.compile(source, changed, inside, flags)
+        if output:
+            return f"does not compile: {output}"
         words = [str(changed_object) if place.get(word) == chosen else word for word in words]
         words[words.index("-o") + 1] = str(out)
         if chosen not in inside:
@@ -73,21 +73,21 @@ class Parts:
         return None if done.returncode == 0 else f"does not link: {done.stderr}"
 
     def change(self, name, file, text):
-        """The changed file, in a folder of its own."""
+        """The changed file, in its own folder."""
         changed = self.work / "parts" / name / Path(file).name
         changed.parent.mkdir(parents=True, exist_ok=True)
         changed.write_text(text)
         return changed
 
     def unchanged(self, command):
-        """How a program ends as it was built, run once."""
+        """The run of the unchanged program, made once."""
         with self.lock:
             if command not in self.as_it_is:
                 self.as_it_is[command] = play(command, Core(self.work), UNMEASURED_S)
             return self.as_it_is[command]
 
     def judge(self, command, source=None, changed=None):
-        """What that program finds, or None; without a change: as it was built. Raises Broken if it cannot be had with the changed file."""
+        """The finding of that program, or None. Without a change: of the program of the build. Raises Broken if the program cannot be built with the changed file."""
         command = tuple(command)
         unchanged = self.unchanged(command)
         if changed is None:
@@ -100,7 +100,7 @@ class Parts:
 
 
 def first_failure(run):
-    """The first test that fails, or how the program ended; None if it passed."""
+    """The first failed test, or how the program ended; None if it passed."""
     if run.status == 0 or run.endless:
         return run.how if run.endless else None
     found = re.search(r":(test_\w+):FAIL", run.output)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Which noticer noticed each seeded fault, and in how many seconds: build/report/faults.json and faults.md. Each run adds to what earlier
-runs found; faults that left the table go."""
+"""Records which noticer noticed each seeded fault, and in how many seconds: build/report/faults.json and faults.md. Each run adds to the findings
+of earlier runs and removes faults that left the table."""
 
 import fcntl
 import json
@@ -13,7 +13,7 @@ found = {}
 
 
 def add(name, results):
-    """`results`: {noticer: (what it found or None, seconds)}"""
+    """Adds `results`: {noticer: (its finding or None, seconds)}"""
     found.setdefault(name, {}).update(results)
 
 

@@ -2,18 +2,19 @@
 """The table of seeded faults: patches keyed by function, in the files *.faults of this folder.
 
     @@ FUNCTION | NAME | RULE | NOTICERS...
-    -code of that function as it is
-    +code as the fault has it
+    -code of that function in the tree
+    +code of that function with the fault
 
-FUNCTION is a symbol of C (function, variable, table, macro) or of Python (function, Class.method), without its file: it is looked up in the
-tree. Where several files have that symbol and the same code, ` / WORD` after it chooses the file that has this word. The removed code must occur exactly once
-in it; blanks and line ends between its tokens do not matter. Without a line of `+` the code is removed. A further `@@ FUNCTION` alone continues the fault with a second patch in the same file.
-RULE is a rule of docs/developer/safety-case.md, or the name of a page in docs/user or docs/developer whose promise the fault breaks. If FUNCTION is gone or no longer has the code, the patch applies where else the code occurs exactly
-once in the tree, and the fault is reported as moved.
+FUNCTION is a symbol of C (function, variable, table, macro) or of Python (function, Class.method), without its file: it is searched in the tree. Where
+several files have that symbol and the same code, ` / WORD` after it chooses the file that has this word. The removed code must occur exactly once in it;
+blanks and line ends between its tokens do not matter. Without a line of `+` the code is removed. A further `@@ FUNCTION` alone continues the fault with a
+second patch in the same file. RULE is a rule of docs/developer/safety-case.md, or the name of a page in docs/user or docs/developer whose promise the fault
+breaks. If FUNCTION is missing or no longer has the code, the patch applies where else the code occurs exactly once in the tree, and the fault is reported as
+moved.
 
 NOTICERS, each of which must notice the fault:
-    unit, sim, orders        all unit tests of the core, the simulated hours, every order of events (two of the three at least)
-    wp, wp:FUNCTION          the proof of that function (default: the function of the patch) no longer closes
+    unit, sim, orders        all unit tests of the core, the simulated hours, every order of events (at least two of the three)
+    wp, wp:FUNCTION          the proof of that function (default: the function of the patch) fails
     eva                      Frama-C Eva raises an alarm
     fuzz:TARGET              the fuzz target finds it
     image:KIND.SCENARIO      a scenario of the emulated STM32F103 with the image KIND
@@ -40,11 +41,11 @@ SYMBOLS = re.compile(
 
 
 class Broken(Exception):
-    """The fault cannot be applied or judged as it is written; the text says why."""
+    """The fault cannot be applied or judged; the text says why."""
 
 
 class Hunk(NamedTuple):
-    function: str  # And, after a slash, a word of its file.
+    function: str  # After a slash: a word of its file.
     was: str
     now: str
 
@@ -59,11 +60,11 @@ class Fault(NamedTuple):
 class Applied(NamedTuple):
     file: str  # Relative to the tree.
     text: str  # Of the whole file, with the fault.
-    moved: str  # Empty, or which function is gone and where its code is now.
+    moved: str  # Empty, or the missing function and the file that now has its code.
 
 
 def code_pattern(code):
-    """Matches these tokens, whatever blanks are between them."""
+    """Matches these tokens with any blanks between them."""
     return re.compile(r"\s*".join(map(re.escape, re.findall(r"\w+|[^\w\s]", code))))
 
 
@@ -100,7 +101,7 @@ def places(hunk, spans):
 
 
 def locate(hunk, root=ROOT):
-    """((path, begin, end), where it moved to or "")."""
+    """((path, begin, end), where it moved to, or "")."""
     function, _, word = hunk.function.partition(" / ")
     found = places(hunk, [span for span in tree(root).get(function, ()) if word in span[0].read_text()])
     if len(found) == 1:
@@ -112,7 +113,7 @@ def locate(hunk, root=ROOT):
 
 
 def apply(fault, root=ROOT):
-    """The fault in its file; raises Broken."""
+    """The text of the file with the fault; raises Broken."""
     found = [(*locate(hunk, root), hunk.now) for hunk in fault.hunks]
     paths = {place[0] for place, _, _ in found}
     if len(paths) != 1:
@@ -154,7 +155,7 @@ def load(folder=HERE):
 
 
 def by(means):
-    """[(fault, what follows the colon of that noticer)] of the faults that this kind of noticer must notice."""
+    """[(fault, the text after the colon of that noticer)] of the faults that this kind of noticer must notice."""
     return [(fault, noticer.partition(":")[2]) for fault in load() for noticer in fault.by if noticer.partition(":")[0] == means]
 
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// What the fuzz targets share: libFuzzer's entry, bytes taken one after the other, and a way to fail.
+/// Shared by all fuzz targets: libFuzzer's entry, a reader of single bytes, and a check that can fail.
 #ifndef FUZZ_H
 #define FUZZ_H
 
@@ -28,7 +28,7 @@ static inline uint16_t fuzz_word(fuzz_bytes_t *bytes) {
     return (uint16_t)(high << 8 | fuzz_byte(bytes));
 }
 
-/// A property does not hold: libFuzzer keeps the input.
+/// Fails if a property does not hold; libFuzzer then stores the input.
 static inline void fuzz_require(bool holds, const char *what) {
     if (!holds) {
         (void)fprintf(stderr, "does not hold: %s\n", what);
@@ -36,14 +36,14 @@ static inline void fuzz_require(bool holds, const char *what) {
     }
 }
 
-/// Says what became of the input where IWHEEL_FUZZ_TELL is set: test/fuzz/run learns so whether a seed is taken.
+/// Prints the result of the input if IWHEEL_FUZZ_TELL is set: test/fuzz/run checks with it that a seed is accepted.
 static inline void fuzz_tell(const char *what) {
-    static int tells = -1;
-    if (tells < 0) {
-        tells = (getenv("IWHEEL_FUZZ_TELL") != NULL) ? 1 : 0;
+    static int prints = -1;
+    if (prints < 0) {
+        prints = (getenv("IWHEEL_FUZZ_TELL") != NULL) ? 1 : 0;
     }
-    if (tells == 1) {
-        (void)fprintf(stderr, "told: %s\n", what);
+    if (prints == 1) {
+        (void)fprintf(stderr, "input: %s\n", what);
     }
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Any bytes as a recording: each line is a frame that is written and read back alike, or empty, or bad with a reason.
+// Any bytes as a recording: each line is a frame that is the same after writing and reading, or empty, or bad with a reason.
 #include "fuzz_sequence.h"
 
 #include "candump.h"
@@ -13,24 +13,24 @@ static void judge_frame(const candump_t *frame) {
                  "within its ranges");
     fuzz_require(memchr(frame->interface, '\0', sizeof frame->interface) != NULL, "the interface's name ends");
     const size_t length = candump_write(frame, line);
-    fuzz_require(length < sizeof line && strlen(line) == length, "what is written fits");
-    fuzz_require(candump_parse(line, length, &again, &why) == CANDUMP_FRAME, "what is written can be read");
+    fuzz_require(length < sizeof line && strlen(line) == length, "a written line fits");
+    fuzz_require(candump_parse(line, length, &again, &why) == CANDUMP_FRAME, "a written line can be read");
     fuzz_require(again.time_us == frame->time_us && again.id == frame->id && again.length == frame->length &&
                      again.remote == frame->remote && again.extended == frame->extended && again.fd == frame->fd &&
                      again.error == frame->error && again.mark == frame->mark,
-                 "and says the same");
+                 "and has the same frame");
     fuzz_require(frame->remote || memcmp(again.data, frame->data, frame->length) == 0, "byte for byte");
 }
 
 static void judge_line(const char *line, size_t length) {
     candump_t frame;
     const char *why = NULL;
-    // A copy of exactly that length: a byte read behind it is found.
+    // A copy of exactly that length: the sanitizer finds a byte that is read after it.
     char *const copy = malloc((length > 0U) ? length : 1U);
     memcpy(copy, line, length);
     switch (candump_parse(copy, length, &frame, &why)) {
     case CANDUMP_FRAME:
-        fuzz_tell("taken");
+        fuzz_tell("accepted");
         judge_frame(&frame);
         break;
     case CANDUMP_BAD:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Any bytes from a gateway to libiwheel-client: whole messages come out of them, in bounds, and what ends the connection ends it once.
-// The connection is a buffer: the linker puts what stands here in the place of the system's calls (--wrap), which would take most of the time.
+// Any bytes from a gateway to libiwheel-client: the client returns whole messages, within bounds, and the end of the connection ends it once.
+// The connection is a buffer: the linker replaces the system calls by functions of this file (--wrap); the real calls would take most of the time.
 #include "connection.h"
 #include "fuzz.h"
 
@@ -12,7 +12,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-/// None of the process's own.
+/// A descriptor that the process does not have.
 #define CONNECTION 100000
 #define WIRE_MAX   65536U
 
@@ -20,10 +20,10 @@ static struct {
     uint8_t bytes[WIRE_MAX];
     size_t begin;
     size_t end;
-    bool closed;  ///< By the gateway.
-    bool narrow;  ///< Takes half of what is sent, then no more.
-    bool shut;    ///< By the client.
-    size_t taken; ///< Bytes that the client sent.
+    bool closed;    ///< Closed by the gateway.
+    bool narrow;    ///< Accepts half of the sent bytes, then no more.
+    bool shut;      ///< Shut by the client.
+    size_t written; ///< Bytes that the client sent.
 } wire;
 
 ssize_t __wrap_recv(int fd, void *out, size_t size, int flags);
@@ -38,7 +38,7 @@ int __real_fcntl(int fd, int command, ...);
 ssize_t __wrap_recv(int fd, void *out, size_t size, int flags) {
     const size_t there = wire.end - wire.begin;
     const size_t now = (size < there) ? size : there;
-    fuzz_require(fd == CONNECTION && !wire.shut && flags == 0 && size > 0U, "it reads where it may");
+    fuzz_require(fd == CONNECTION && !wire.shut && flags == 0 && size > 0U, "it reads from the connection");
     if (now == 0U && !wire.closed) {
         errno = EAGAIN;
         return -1;
@@ -50,17 +50,17 @@ ssize_t __wrap_recv(int fd, void *out, size_t size, int flags) {
 
 ssize_t __wrap_send(int fd, const void *bytes, size_t size, int flags) {
     fuzz_require(fd == CONNECTION && !wire.shut && flags == MSG_NOSIGNAL && bytes != NULL && size > 0U,
-                 "it writes where it may");
+                 "it writes to the connection");
     if (wire.closed) {
         errno = EPIPE;
         return -1;
     }
-    if (wire.narrow && wire.taken > 0U) {
+    if (wire.narrow && wire.written > 0U) {
         errno = EAGAIN;
         return -1;
     }
     const size_t now = wire.narrow ? (size + 1U) / 2U : size;
-    wire.taken += now;
+    wire.written += now;
     return (ssize_t)now;
 }
 
@@ -95,8 +95,8 @@ int __wrap_fcntl(int fd, int command, ...) {
     return (fd == CONNECTION) ? 0 : __real_fcntl(fd, command, value);
 }
 
-static void tell(const void *bytes, size_t size) {
-    fuzz_require(size <= WIRE_MAX - wire.end, "the wire takes it");
+static void feed(const void *bytes, size_t size) {
+    fuzz_require(size <= WIRE_MAX - wire.end, "the bytes fit");
     memcpy(&wire.bytes[wire.end], bytes, size);
     wire.end += size;
 }
@@ -122,7 +122,7 @@ static void judge_message(const iwc_t *self, const iwc_message_t *message) {
     }
 }
 
-/// Reads as the byte says.
+/// Reads with the call that the byte selects.
 static iwc_result_t read_some(iwc_t *self, uint8_t how) {
     iwc_message_t message;
     iwc_result_t result = IWC_OK;
@@ -146,13 +146,13 @@ static iwc_result_t read_some(iwc_t *self, uint8_t how) {
     return result;
 }
 
-/// The same bytes as the first words of whoever is there.
+/// Uses the same bytes as the greeting of the peer.
 static void judge_greeting(iwc_t *self, const uint8_t *data, size_t size) {
-    tell(data, size);
+    feed(data, size);
     wire.closed = (size % 2U) != 0U;
     const iwc_result_t result = iwc_adopt(self, CONNECTION, 0);
-    fuzz_tell((result == IWC_OK || result == IWC_NEWER || result == IWC_REFUSED) ? "taken" : "refused");
-    fuzz_require((result == IWC_OK || result == IWC_NEWER) || self->fd < 0, "nobody is called who did not greet");
+    fuzz_tell((result == IWC_OK || result == IWC_NEWER || result == IWC_REFUSED) ? "accepted" : "refused");
+    fuzz_require((result == IWC_OK || result == IWC_NEWER) || self->fd < 0, "no connection without a greeting");
     fuzz_require(result != IWC_REFUSED || strlen(iwc_reason(self)) < sizeof self->reason, "a refusal's words end");
     iwc_close(self);
 }
@@ -165,29 +165,29 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         return -1;
     }
     self = (self != NULL) ? self : iwc_new();
-    wire.begin = wire.end = wire.taken = 0;
+    wire.begin = wire.end = wire.written = 0;
     wire.closed = wire.narrow = wire.shut = false;
     fuzz_require(self != NULL, "there is memory");
     if ((how & 0xF0U) == 0x90U) {
         judge_greeting(self, data + bytes.at, size - bytes.at);
         return 0;
     }
-    tell(HELLO, sizeof HELLO - 1U);
+    feed(HELLO, sizeof HELLO - 1U);
     fuzz_require(iwc_adopt(self, CONNECTION, 1000) == IWC_OK, "it is greeted");
     wire.narrow = (how & 0xF0U) == 0x70U;
     self->requests = 0;
-    // Cut where the first byte says, so that lines come torn.
+    // The first byte selects where the input is cut, so lines are torn.
     const size_t piece = (how >= 16U) ? how : 65536U;
     iwc_result_t result = IWC_TIMEOUT;
     while (bytes.at < size && self->fd >= 0) {
         const size_t now = (size - bytes.at < piece) ? size - bytes.at : piece;
-        tell(data + bytes.at, now);
+        feed(data + bytes.at, now);
         bytes.at += now;
         result = read_some(self, how);
     }
     result = read_some(self, 0);
     fuzz_tell((result == IWC_TIMEOUT && self->begin == self->whole && self->whole == self->end && size > 1U)
-                  ? "taken"
+                  ? "accepted"
                   : "refused");
     wire.closed = true;
     result = read_some(self, 0);

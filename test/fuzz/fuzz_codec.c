@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Any bytes as a frame: what is decoded says what its bytes say, and encoding it again gives them back.
+// Any bytes as a frame: decoding gives the values of its bytes, and encoding returns the same bytes.
 #include "fuzz_sequence.h"
 
 #include "../support/message.h"
@@ -35,7 +35,7 @@ static void judge(const iw_can_frame_t *frame, const message_t *message) {
     iw_can_frame_t again;
     fuzz_require(frame->id <= IW_CAN_ID_MASK, "only 11-bit data frames are decoded");
     fuzz_require(frame->dlc >= least_dlc(message->kind) && frame->dlc <= IW_CAN_DATA_MAX, "short frames are refused");
-    fuzz_require(message_encode(message, &again) == IW_OK, "what was decoded can be encoded");
+    fuzz_require(message_encode(message, &again) == IW_OK, "a decoded frame can be encoded");
     fuzz_require(again.id == frame->id && again.dlc == least_dlc(message->kind),
                  "to the same id, in the table's length");
     if (message->kind == IW_CODEC_SETPOINT) {
@@ -61,7 +61,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         const iw_can_frame_t frame = take_frame(&bytes);
         message_t message;
         if (message_decode(&frame, &message)) {
-            fuzz_tell("taken");
+            fuzz_tell("accepted");
             judge(&frame, &message);
         } else {
             fuzz_tell("refused");

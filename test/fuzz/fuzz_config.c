@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Any bytes as a configuration file: refused with a message and nothing changed, or in force, printed and read back alike.
+// Any bytes as a configuration file: refused with a message and no change, or accepted, and the same after printing and reading.
 #include "fuzz.h"
 
 #include "config/gateway_config.h"
@@ -8,7 +8,7 @@ static void judge_accepted(const gateway_config_t *config, FILE *null) {
     static char printed[GATEWAY_CONFIG_FILE_MAX];
     static gateway_config_t again;
     FILE *const out = fmemopen(printed, sizeof printed, "w");
-    fuzz_require(iw_config_check(&config->core) == IW_CONFIG_OK, "the core takes what was accepted");
+    fuzz_require(iw_config_check(&config->core) == IW_CONFIG_OK, "the core accepts the configuration");
     fuzz_require(memchr(config->bus.interface, '\0', sizeof config->bus.interface) != NULL &&
                      memchr(config->estop.line, '\0', sizeof config->estop.line) != NULL &&
                      memchr(config->northbound.socket, '\0', sizeof config->northbound.socket) != NULL,
@@ -16,8 +16,8 @@ static void judge_accepted(const gateway_config_t *config, FILE *null) {
     gateway_config_print(config, out);
     (void)fclose(out);
     fuzz_require(gateway_config_parse("again", printed, strlen(printed), &again, null) == 0,
-                 "what is printed is accepted");
-    fuzz_require(memcmp(&again.core, &config->core, sizeof again.core) == 0, "and says the same");
+                 "the printed text is accepted");
+    fuzz_require(memcmp(&again.core, &config->core, sizeof again.core) == 0, "and has the same values");
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
@@ -28,12 +28,12 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     memset(&config, 0, sizeof config);
     before = config;
     const int result = gateway_config_parse("fuzz.conf", (const char *)data, size, &config, err);
-    const long told = ftell(err);
-    fuzz_tell((result == 0) ? "taken" : "refused");
+    const long length = ftell(err);
+    fuzz_tell((result == 0) ? "accepted" : "refused");
     if (result == 0) {
         judge_accepted(&config, err);
     } else {
-        fuzz_require(told > 0, "a refusal has a message");
+        fuzz_require(length > 0, "a refusal has a message");
         fuzz_require(memcmp(&before, &config, sizeof config) == 0, "and changes nothing");
     }
     (void)fclose(err);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A gateway in a world that does whatever the bytes say: times, frames, echoes that lie, bus, button, requests, what is
-// known. Whatever happens, only setpoints within the limits leave, and none but zero after a cut until arm and a drive were accepted.
+// A gateway in a world that the bytes control completely: times, frames, false echoes, bus, button, requests, assumptions. In every
+// world only setpoints within the limits are sent, and after a cut only zero until arm and a drive were accepted.
 #include "fuzz_sequence.h"
 
 #include "../support/message.h"
@@ -16,7 +16,7 @@ typedef struct {
     uint32_t received;
     iw_bus_state_t bus;
     int estop;
-    uint32_t accepts; ///< Frames of one call.
+    uint32_t accepts; ///< Accepted frames of one call.
     bool purges;
     bool cut;
     bool arm_after_cut;
@@ -35,7 +35,7 @@ static bool judge_setpoint(world_t *world, const iw_can_frame_t *frame) {
     fuzz_require(frame->id == IW_ID_LEFT_SETPOINT || frame->id == IW_ID_RIGHT_SETPOINT, "only setpoints leave");
     fuzz_require(frame->dlc == config->setpoint_dlc && frame->data[0] == config->setpoint_type, "as configured");
     fuzz_require(abs(speed) <= config->max_speed_mm_s && abs(current) <= config->max_current_mA, "within the limits");
-    fuzz_require(zero || !world->cut, "nothing but zero until armed and commanded anew");
+    fuzz_require(zero || !world->cut, "only zero until a new arm and command");
     fuzz_require(world->bus >= IW_BUS_PASSIVE, "nothing leaves while the bus is down");
     fuzz_require(zero || config->track_mm != 0U, "no wheel moves while the track is not set");
     fuzz_require(!config->listen_only, "nothing leaves in listen-only");
@@ -43,7 +43,7 @@ static bool judge_setpoint(world_t *world, const iw_can_frame_t *frame) {
     return zero;
 }
 
-/// What moves leaves to both wheels in one call, the left one first. A port that accepts one of two is among the worlds.
+/// Motion is sent to both wheels in one call, the left one first. Some worlds have a port that accepts only one of two frames.
 static int world_send(void *context, const iw_can_frame_t *frames, uint32_t count) {
     world_t *const world = context;
     const bool pair = count == 2U && frames[0].id == IW_ID_LEFT_SETPOINT && frames[1].id == IW_ID_RIGHT_SETPOINT;
@@ -123,7 +123,7 @@ static void put(world_t *world, const iw_can_frame_t *frame) {
     }
 }
 
-/// Speeds of both wheels, as good wheels send them.
+/// Speeds of both wheels, as correct wheels send them.
 static void put_telemetry(world_t *world, int16_t rpm) {
     for (int side = 0; side < IW_SIDES; side++) {
         const message_t message = {IW_CODEC_SPEED, (iw_side_t)side, {.speed = {rpm, 0}}};
@@ -133,7 +133,7 @@ static void put_telemetry(world_t *world, int16_t rpm) {
     }
 }
 
-/// What the account waits for, or the same with a wrong byte.
+/// The echo that the gateway waits for, or the same with a wrong byte.
 static void put_echo(world_t *world, iw_side_t side, uint8_t wrong) {
     const uint32_t value = world->gateway.sender.confirmation.value[side][0];
     iw_can_frame_t frame = {.id = (side == IW_LEFT) ? 266U : 298U, .dlc = 5, .kind = IW_CAN_ECHO};
@@ -211,7 +211,7 @@ static void step(world_t *world, uint32_t after_us) {
                  "the gate has nothing to stop");
 }
 
-/// Some good milliseconds, so that a few bytes lead to motion.
+/// Runs some milliseconds with correct wheels, so that a few bytes lead to motion.
 static void calm(world_t *world, uint8_t steps) {
     for (unsigned i = 0; i < steps % 64U; i++) {
         put_telemetry(world, 0);
@@ -224,7 +224,7 @@ static void calm(world_t *world, uint8_t steps) {
     }
 }
 
-/// Wheels that stand for a while with a load on them, so that a window of forces ends.
+/// Wheels at standstill for a while with a load on them, so that a window of forces ends.
 static void weigh(world_t *world, int8_t load) {
     for (unsigned i = 0; i < 45U; i++) {
         for (int side = 0; side < IW_SIDES; side++) {
@@ -237,7 +237,7 @@ static void weigh(world_t *world, int8_t load) {
     }
 }
 
-/// What the port and the operator tell, and what is looked at.
+/// Input of the port and the operator, and a snapshot.
 static void learn(world_t *world, fuzz_bytes_t *bytes, uint8_t what) {
     const uint8_t value = fuzz_byte(bytes);
     const iw_bus_facts_t facts = {(value & 1U) != 0U, (value & 2U) != 0U};
@@ -264,7 +264,7 @@ static void learn(world_t *world, fuzz_bytes_t *bytes, uint8_t what) {
         break;
     }
     iw_gateway_snapshot(&world->gateway, world->now_us, &seen);
-    fuzz_require(seen.state == iw_gateway_state(&world->gateway), "what is told is what is");
+    fuzz_require(seen.state == iw_gateway_state(&world->gateway), "the snapshot has the state of the gateway");
 }
 
 static void act(world_t *world, fuzz_bytes_t *bytes) {
@@ -311,7 +311,7 @@ static void act(world_t *world, fuzz_bytes_t *bytes) {
     }
 }
 
-/// What `act` reads; the first three bytes are those of `begin`, and never a unit that harms.
+/// The units of `act`; the first three bytes are those of `begin`, and as a unit they are harmless.
 static size_t fuzz_unit(const uint8_t *data, size_t size) {
     size_t length = 2;
     if (data[0] % 12U == 6U) {
@@ -332,6 +332,6 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         act(&world, &bytes);
     }
     calm(&world, 20);
-    fuzz_tell(world.moved ? "taken" : "refused");
+    fuzz_tell(world.moved ? "accepted" : "refused");
     return 0;
 }

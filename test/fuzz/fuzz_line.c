@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
-// Any bytes on the serial wire: every line that is taken is one that would be written so, nothing is taken of the rest, the buffer
-// holds, and after a newline a good line is always heard.
+// Any bytes on the serial wire: every accepted line is the only spelling of its content, all other lines are refused, the buffer
+// holds, and after a newline a correct line is always received.
 #include "fuzz.h"
 
 #include "iwheel_northbound/line.h"
 
-#define ROOM 512U
+#define SIZE 512U
 
 static void judge_line(const iwn_line_t *line, bool stamped) {
-    char again[ROOM + 1U];
+    char again[SIZE + 1U];
     fuzz_require(line->channel <= IWN_LINE_CHANNELS && line->stamped == stamped, "channel and direction");
     fuzz_require(line->json[0] == '{' && line->json[line->length - 1U] == '}', "braces");
     const size_t length = iwn_line_write(line, again, sizeof again);
@@ -16,10 +16,10 @@ static void judge_line(const iwn_line_t *line, bool stamped) {
     fuzz_require(length > IWN_LINE_SUFFIX && memcmp(begin, again, length - 1U) == 0, "it has one spelling");
 }
 
-/// A quote that is taken is one that would be written so.
+/// Every accepted quote has exactly one spelling.
 static void judge_quote(const iwn_line_t *line) {
-    char copy[ROOM];
-    char again[ROOM + IWN_QUOTE_SIZE];
+    char copy[SIZE];
+    char again[SIZE + IWN_QUOTE_SIZE];
     char *json = copy;
     size_t length = line->length;
     iwn_quote_t quote;
@@ -35,25 +35,25 @@ static void judge_quote(const iwn_line_t *line) {
 static void judge(iwn_receiver_t *receiver, char byte, bool stamped) {
     iwn_line_t line;
     if (iwn_receiver_put(receiver, byte, &line) == IWN_LINE_GOOD) {
-        fuzz_tell("taken");
+        fuzz_tell("accepted");
         judge_line(&line, stamped);
         judge_quote(&line);
     }
-    fuzz_require(receiver->length < ROOM, "no byte beyond the buffer");
+    fuzz_require(receiver->length < SIZE, "no byte beyond the buffer");
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     for (unsigned stamped = 0; stamped < 2U; stamped++) {
-        char *const room = malloc(ROOM); // Of exactly that size: a byte beyond is found.
+        char *const buffer = malloc(SIZE); // Exactly this size: the sanitizer finds a byte beyond it.
         iwn_receiver_t receiver;
-        iwn_receiver_init(&receiver, room, ROOM, stamped != 0U);
+        iwn_receiver_init(&receiver, buffer, SIZE, stamped != 0U);
         for (size_t i = 0; i < size; i++) {
             if (data[i] == 0xFFU) {
                 iwn_receiver_spoil(&receiver);
-            } else if (data[i] == 0xFEU) { // The right CRC for what stands there: or hardly any line would be taken.
-                char end[ROOM];
-                const size_t length = (receiver.length + IWN_LINE_SUFFIX <= ROOM) ? receiver.length : 0U;
-                memcpy(end, room, length);
+            } else if (data[i] == 0xFEU) { // Insert the right CRC; without it hardly any line would be accepted.
+                char end[SIZE];
+                const size_t length = (receiver.length + IWN_LINE_SUFFIX <= SIZE) ? receiver.length : 0U;
+                memcpy(end, buffer, length);
                 const size_t whole = iwn_line_end(end, length, sizeof end);
                 for (size_t n = length; n < whole; n++) {
                     judge(&receiver, end[n], stamped != 0U);
@@ -69,8 +69,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         for (const char *c = good[stamped]; *c != '\0'; c++) {
             last = iwn_receiver_put(&receiver, *c, &line);
         }
-        fuzz_require(last == IWN_LINE_GOOD, "after a newline a good line is heard");
-        free(room);
+        fuzz_require(last == IWN_LINE_GOOD, "after a newline a correct line is received");
+        free(buffer);
     }
     return 0;
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Any bytes as the file of what is known of the wheels: refused with a reason and nothing changed, or possible, and the same when it has been
-// written and read again. The mutator puts the checksum right, or nothing would ever come behind it.
+// Any bytes as the file of the assumption store: refused with a reason and no change, or possible, and the same after
+// writing and reading. The mutator corrects the checksum; otherwise hardly any input would pass it.
 #include "fuzz.h"
 
 #include "assumptions/assumptions_file.h"
@@ -34,15 +34,15 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     static gw_stored_t before;
     char reason[GW_ASSUMPTIONS_REASON_SIZE] = "";
     char *const text = malloc((size > 0U) ? size : 1U);
-    memcpy(text, data, size); // Of exactly its length: a byte read behind it is found.
+    memcpy(text, data, size); // Exactly this length: the sanitizer finds a byte that is read after it.
     memset(&known, 0xA5, sizeof known);
     before = known;
     if (gw_assumptions_file_read(text, size, BUS, &known, reason)) {
-        fuzz_tell("taken");
+        fuzz_tell("accepted");
         for (unsigned item = 0; item < IW_ASSUMPTION_ITEMS; item++) {
             fuzz_require(known.item[item].entry.state == IW_ASSUMED ||
                              gw_bounds_item((iw_assumption_item_t)item, &known.item[item]),
-                         "evidence that a run could find");
+                         "an observation that a run could make");
         }
         for (unsigned side = 0; side < IW_SIDES; side++) {
             fuzz_require(known.offset[side].from == IW_OFFSET_NONE || gw_bounds_offset(&known.offset[side]),
@@ -51,8 +51,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         const size_t length = gw_assumptions_file_write(&known, BUS, again, sizeof again);
         memset(&before, 0, sizeof before);
         fuzz_require(length > 0U && gw_assumptions_file_read(again, length, BUS, &before, reason),
-                     "written, it can be read");
-        fuzz_require(memcmp(&before, &known, sizeof known) == 0, "and says the same");
+                     "the written file can be read");
+        fuzz_require(memcmp(&before, &known, sizeof known) == 0, "and has the same values");
     } else {
         fuzz_tell("refused");
         fuzz_require(memchr(reason, '\0', sizeof reason) != NULL && reason[0] != '\0', "a refusal has a reason");

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Any bytes as a command by MQTT, as a spool's file, and as what the console reads. What is taken is this run's, in time, once, and one line for
-// the gateway; what is read of a file is whole; what the console shows moves no terminal and names no file of its own choice.
+// Any bytes as a command by MQTT, as a spool's file, and as input of the console. An accepted command belongs to this run, is in time, comes once,
+// and is one line for the gateway; a record read from a file is whole; output of the console moves no terminal and names no foreign file.
 #include "fuzz.h"
 
 #include "fetch.h"
@@ -28,7 +28,7 @@ static bool is_spool(const uint8_t *data, size_t size) {
     return size >= sizeof SPOOL - 1U && memcmp(data, SPOOL, sizeof SPOOL - 1U) == 0;
 }
 
-/// Lengths and checksums of the records put right; the last one ends with the file. Else no change to a spool would come behind them.
+/// Corrects lengths and checksums of the records; the last record ends with the file. Otherwise no change of a spool would pass them.
 static void seal(uint8_t *at, size_t left) {
     while (left >= HEAD_SIZE + BODY_SIZE) {
         size_t length = at[0] | (size_t)at[1] << 8;
@@ -53,12 +53,12 @@ size_t LLVMFuzzerCustomMutator(uint8_t *data, size_t size, size_t max_size, unsi
     return magic + length;
 }
 
-/// A stop needs no number that rises and no place among the senders: it is never refused for another's sake.
+/// A stop needs no rising number and no place among the senders: no other sender can prevent it.
 static bool is_stop(mqtt_verb_t verb) {
     return verb == MQTT_STOP || verb == MQTT_ESTOP;
 }
 
-/// What has been taken counts once, and in time only. A greeting may come again, and a stop while it is in time.
+/// An accepted command counts once, and only in time. A greeting may come again, and a stop while it is in time.
 static void judge_again(mqtt_judge_t *judge, const mqtt_rules_t *rules, const mqtt_command_t *command) {
     mqtt_order_t order;
     mqtt_judge(judge, rules, command, NOW_US, &order);
@@ -78,13 +78,13 @@ static void judge_command(const mqtt_rules_t *rules, const mqtt_command_t *comma
     mqtt_judge(&judge, rules, command, NOW_US, &order);
     fuzz_require(judge.counts[order.verdict] == 1U, "counted");
     fuzz_require((order.verdict == MQTT_TAKEN) == (order.request[0] != '\0'), "a request, or a reason");
-    fuzz_tell((order.verdict == MQTT_TAKEN) ? "taken" : "refused");
+    fuzz_tell((order.verdict == MQTT_TAKEN) ? "accepted" : "refused");
     if (order.verdict != MQTT_TAKEN) {
         fuzz_require(order.why[0] != '\0', "and why");
         return;
     }
     fuzz_require(order.from[0] != '\0' && strpbrk(order.from, "/+#\" ") == NULL, "a name");
-    fuzz_require(order.to[0] != '\0' && strpbrk(order.to, "/+#\" ") == NULL, "and to whom the answer goes");
+    fuzz_require(order.to[0] != '\0' && strpbrk(order.to, "/+#\" ") == NULL, "and the receiver of the reply");
     fuzz_require(strchr(order.request, '\n') == NULL && strncmp(order.request, "{\"cmd\":\"", 8) == 0, "one line");
     fuzz_require(strncmp(order.request + 8, command->verb, strlen(command->verb)) == 0, "of that verb");
     fuzz_require(order.verb != MQTT_RESET || rules->may_reset, "not configured");
@@ -96,8 +96,8 @@ static void judge_command(const mqtt_rules_t *rules, const mqtt_command_t *comma
     judge_again(&judge, rules, command);
 }
 
-/// The first line is the verb, where a tab follows: response topic, and behind another one correlation data. Before the verb may stand `!`: it
-/// is retained; `#`: sixteen others spoke just now; `-`: the bridge watches only; `+`: it may reset.
+/// The first line is the verb; after a tab the response topic; after another tab correlation data. Flags may precede the verb: `!` the message
+/// is retained; `#` sixteen other senders were active just now; `-` the bridge only watches; `+` the bridge may reset.
 static void judge(const uint8_t *data, size_t size) {
     mqtt_rules_t rules = {"0123456789abcdef", 300, true, false, "iwheel/w1/reply/"};
     mqtt_command_t command = {0};
@@ -125,7 +125,8 @@ static void judge(const uint8_t *data, size_t size) {
         *tab = '\0';
     }
     char *payload = malloc(size - length);
-    memcpy(payload, newline + 1, size - length - 1U); // Of exactly its length: a byte read behind it is found.
+    memcpy(payload, newline + 1,
+           size - length - 1U); // Exactly this length: the sanitizer finds a byte that is read after it.
     command.verb = verb;
     command.payload = payload;
     command.length = size - length - 1U;
@@ -148,25 +149,25 @@ static void read_file(const uint8_t *data, size_t size) {
     const int file = open(path, O_CREAT | O_TRUNC | O_WRONLY | O_CLOEXEC, 0600);
     fuzz_require(file >= 0 && write(file, data, size) == (ssize_t)size, "a file");
     (void)close(file);
-    fuzz_require(mqtt_spool_open(&spool, folder, 0), "opened, whatever is in it");
+    fuzz_require(mqtt_spool_open(&spool, folder, 0), "it opens with any content");
     size_t found = 0;
     for (; mqtt_spool_after(&spool, number, &event); number = event.number) {
         fuzz_require(event.number > number && strlen(event.name) + event.length < MQTT_SPOOL_EVENT_MAX, "an event");
         found++;
     }
-    fuzz_require(found == spool.waiting, "as many as it says");
-    fuzz_tell((found > 0U) ? "taken" : "refused");
+    fuzz_require(found == spool.waiting, "as many as it reports");
+    fuzz_tell((found > 0U) ? "accepted" : "refused");
     fuzz_require(mqtt_spool_add(&spool, "stop", "{}", 2, 0), "it goes on");
     fuzz_require(mqtt_spool_after(&spool, number, &event) && strcmp(event.name, "stop") == 0, "in order");
     const uint64_t added = event.number;
     mqtt_spool_confirm(&spool, added - 1U);
     fuzz_require(spool.waiting == 1U && mqtt_spool_after(&spool, 0, &event) && event.number == added,
-                 "what is confirmed is gone");
+                 "a confirmed event is removed");
     (void)mqtt_spool_close(&spool);
     (void)unlink(path);
 }
 
-/// The same bytes as an event of the stream, and as the answer to whatever the console asks for.
+/// Uses the same bytes as an event of the stream, and as the reply to each request of the console.
 static void show(const uint8_t *data, size_t size) {
     static const history_config_t config = {.since_us = 1, .until_us = INT64_MAX, .all = true};
     static history_t history;
@@ -177,13 +178,14 @@ static void show(const uint8_t *data, size_t size) {
     char asked[512];
     char *payload = malloc(size + 1U);
     memcpy(payload, data, size);
-    payload[size] = '\0'; // As the libraries hand it over.
+    payload[size] = '\0'; // The libraries add this NUL.
     FILE *out = open_memstream(&text, &length);
     fuzz_require(out != NULL && history_open(&history, &config, out), "memory");
     (void)history_take(&history, "iwheel/w1/event/stop", payload, size, 1000000);
     (void)history_take(&history, "iwheel/w1/event/fault", payload, size, 2000000);
     (void)fclose(out);
-    fuzz_require(history.told + history.doubled + history.garbled == 2U && strchr(text, '\033') == NULL, "each once");
+    fuzz_require(history.told + history.doubled + history.garbled == 2U && strchr(text, '\033') == NULL,
+                 "each once");
     history_close(&history);
     free(text);
     fetch_begin(&fetch, "w1", "me", 60000000U, NOW_US);

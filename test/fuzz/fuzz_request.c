@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Any bytes as a client's line: a request in which every field is what it should be, or a refusal that can be printed; and the
-// same as the reader of before says (old_reader.h), to the word.
+// Any bytes as a client's line: a request in which every field is valid, or a refusal that can be printed; and the same
+// result as the earlier reader gives (old_reader.h), word for word.
 #include "fuzz.h"
 
 #include "old_reader.h"
@@ -57,21 +57,22 @@ static void compare_requests(const iwn_request_t *now, const iwn_request_t *befo
                  "the same texts");
 }
 
-/// The reader of before drops a NUL behind a number or a word without a sound: that one difference is meant.
-static void compare(const char *line, size_t size, bool taken, const iwn_request_t *now, const iwn_refusal_t *refusal) {
+/// The earlier reader drops a NUL after a number or a word without a refusal: this one difference is intended.
+static void compare(const char *line, size_t size, bool accepted, const iwn_request_t *now,
+                    const iwn_refusal_t *refusal) {
     static iwn_request_t before;
     static iwn_refusal_t refusal_before;
-    const bool taken_before = old_request_read(line, size, &before, &refusal_before);
+    const bool accepted_before = old_request_read(line, size, &before, &refusal_before);
     if (memchr(line, '\0', size) != NULL) {
-        fuzz_require(!taken && refusal->error == IWN_BAD_JSON, "a NUL is bad JSON");
+        fuzz_require(!accepted && refusal->error == IWN_BAD_JSON, "a NUL is bad JSON");
         return;
     }
-    fuzz_require(taken == taken_before, "both take it, or none does");
+    fuzz_require(accepted == accepted_before, "both accept it, or neither");
     compare_ids(&now->id, &before.id);
-    if (taken) {
+    if (accepted) {
         compare_requests(now, &before);
     } else {
-        fuzz_require(refusal->error == refusal_before.error, "refused by the same name");
+        fuzz_require(refusal->error == refusal_before.error, "refused with the same name");
         fuzz_require(strcmp(refusal->message, refusal_before.message) == 0, "refused in the same words");
     }
 }
@@ -83,21 +84,21 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     if (memchr(data, '\n', size) != NULL || size > IWN_LINE_MAX) {
         return -1;
     }
-    // A copy of exactly that length: a byte read behind it is found.
+    // A copy of exactly that length: the sanitizer finds a byte that is read after it.
     char *const line = malloc((size > 0U) ? size : 1U);
     memcpy(line, data, size);
     memset(&request, 0xA5, sizeof request);
     memset(&refusal, 0xA5, sizeof refusal);
-    const bool taken = iwn_request_read(line, size, &work, &request, &refusal);
-    if (taken) {
-        fuzz_tell("taken");
+    const bool accepted = iwn_request_read(line, size, &work, &request, &refusal);
+    if (accepted) {
+        fuzz_tell("accepted");
         judge_request(&request);
     } else {
         fuzz_tell("refused");
         judge_refusal(&refusal);
     }
-    fuzz_require(request.id.kind <= IWN_ID_TEXT, "the id is known, or known to be unknown");
-    compare(line, size, taken, &request, &refusal);
+    fuzz_require(request.id.kind <= IWN_ID_TEXT, "the id has a known kind");
+    compare(line, size, accepted, &request, &refusal);
     free(line);
     return 0;
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-/// A mutator for inputs that are sequences of units, as frames, lines or requests: it takes units out, doubles, swaps, moves and joins
-/// them, and changes bytes within one, so that most of what it makes can still be taken. Included by the one file of a program, which
-/// says what its units are.
+/// A mutator for inputs that are sequences of units, such as frames, lines or requests. It removes, doubles, swaps, moves and joins
+/// units, and changes bytes within one, so most of its inputs are still acceptable. One file of each program includes it and
+/// defines its units.
 #ifndef FUZZ_SEQUENCE_H
 #define FUZZ_SEQUENCE_H
 
@@ -15,7 +15,7 @@ size_t LLVMFuzzerCustomMutator(uint8_t *data, size_t size, size_t max_size, unsi
 size_t LLVMFuzzerCustomCrossOver(const uint8_t *one, size_t one_size, const uint8_t *other, size_t other_size,
                                  uint8_t *out, size_t max_size, unsigned int seed);
 
-/// Length of the unit that begins there: 1 to size, of size >= 1.
+/// Returns the length of the unit that begins there: 1 to size; size >= 1.
 static size_t fuzz_unit(const uint8_t *data, size_t size);
 
 static uint32_t fuzz_chance(unsigned int *seed, uint32_t limit) {
@@ -23,7 +23,7 @@ static uint32_t fuzz_chance(unsigned int *seed, uint32_t limit) {
     return (uint32_t)((uint64_t)(*seed >> 8) * limit >> 24);
 }
 
-/// Where the units begin, and as the last entry where the last one ends. How many there are.
+/// Writes where each unit begins, and as the last entry where the last unit ends. Returns their number.
 static size_t fuzz_units(const uint8_t *data, size_t size, size_t begin[FUZZ_UNITS_MAX + 1U]) {
     size_t count = 0;
     size_t at = 0;
@@ -36,12 +36,12 @@ static size_t fuzz_units(const uint8_t *data, size_t size, size_t begin[FUZZ_UNI
 }
 
 static size_t fuzz_put(uint8_t *out, size_t length, size_t max_size, const uint8_t *bytes, size_t size) {
-    const size_t taken = (size < max_size - length) ? size : max_size - length;
-    memcpy(&out[length], bytes, taken);
-    return length + taken;
+    const size_t copied = (size < max_size - length) ? size : max_size - length;
+    memcpy(&out[length], bytes, copied);
+    return length + copied;
 }
 
-/// The units of `old` with `one` left out, doubled, or with `other` before it.
+/// Writes the units of `old` with one left out, doubled, or with `other` before it.
 static size_t fuzz_rearrange(uint8_t *out, size_t max_size, const uint8_t *old, const size_t *begin, size_t count,
                              unsigned int *seed) {
     const size_t one = fuzz_chance(seed, (uint32_t)count);
@@ -61,15 +61,15 @@ static size_t fuzz_rearrange(uint8_t *out, size_t max_size, const uint8_t *old, 
     return length;
 }
 
-/// One unit with some of its bytes changed.
+/// Changes some bytes of one unit.
 static size_t fuzz_within(uint8_t *out, size_t max_size, const uint8_t *old, const size_t *begin, size_t count,
                           unsigned int *seed) {
     static uint8_t unit[FUZZ_ROOM];
     const size_t one = fuzz_chance(seed, (uint32_t)count);
     const size_t size = begin[one + 1U] - begin[one];
-    const size_t room = (size * 2U + 16U < sizeof unit) ? size * 2U + 16U : sizeof unit;
-    memcpy(unit, &old[begin[one]], (size < room) ? size : room);
-    const size_t changed = LLVMFuzzerMutate(unit, (size < room) ? size : room, room);
+    const size_t capacity = (size * 2U + 16U < sizeof unit) ? size * 2U + 16U : sizeof unit;
+    memcpy(unit, &old[begin[one]], (size < capacity) ? size : capacity);
+    const size_t changed = LLVMFuzzerMutate(unit, (size < capacity) ? size : capacity, capacity);
     size_t length = fuzz_put(out, 0, max_size, old, begin[one]);
     length = fuzz_put(out, length, max_size, unit, changed);
     return fuzz_put(out, length, max_size, &old[begin[one + 1U]], begin[count] - begin[one + 1U]);
@@ -81,7 +81,7 @@ size_t LLVMFuzzerCustomMutator(uint8_t *data, size_t size, size_t max_size, unsi
     unsigned int chance = seed;
     const size_t count = (size <= sizeof old) ? fuzz_units(data, size, begin) : 0U;
     const uint32_t what = fuzz_chance(&chance, 8);
-    if (count == 0U || what < 4U) { // Half of them as ever: what depends on single bytes is found sooner so.
+    if (count == 0U || what < 4U) { // libFuzzer's own mutations for one half: they find faults of single bytes sooner.
         return LLVMFuzzerMutate(data, size, max_size);
     }
     memcpy(old, data, size);
@@ -90,7 +90,7 @@ size_t LLVMFuzzerCustomMutator(uint8_t *data, size_t size, size_t max_size, unsi
     return (length > 0U) ? length : fuzz_put(data, 0, max_size, old, size);
 }
 
-/// The first units of one, the last of the other.
+/// Joins the first units of one input and the last units of the other.
 size_t LLVMFuzzerCustomCrossOver(const uint8_t *one, size_t one_size, const uint8_t *other, size_t other_size,
                                  uint8_t *out, size_t max_size, unsigned int seed) {
     static size_t begin[FUZZ_UNITS_MAX + 1U];
@@ -102,7 +102,7 @@ size_t LLVMFuzzerCustomCrossOver(const uint8_t *one, size_t one_size, const uint
     return fuzz_put(out, length, max_size, &other[from], other_size - from);
 }
 
-/// Units that end with that byte.
+/// Defines units that end with that byte.
 static inline size_t fuzz_until(const uint8_t *data, size_t size, uint8_t end) {
     const uint8_t *at = memchr(data, end, size);
     return (at != NULL) ? (size_t)(at - data) + 1U : size;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Any sequence of requests, in time, to a whole gateway with its wheels: by the board's host code, whose answers need no socket. Each line of
-// the input is one deed: `+N` lets N ms pass, `^` and `_` press and release the button, `q` asks on channel 1 with all that a command
-// must quote, `@` lets the relay speak, `2` a client on channel 2, anything else is said on channel 1 as it is. Whatever is asked in whatever order: every line that is answered is whole, an id is
-// answered once, the wheels are told no more than the limits, nothing while it listens, and in a latch never more than before.
+// Any sequence of requests, in time, to a whole gateway with its wheels: through the board's host code, whose replies need no socket. Each line of
+// the input is one action: `+N` lets N ms pass, `^` and `_` press and release the button, `q` sends a request on channel 1 with all fields that a
+// command must quote, `@` is a line of the relay, `2` a client on channel 2, any other line is sent on channel 1 unchanged. For any order of requests: every reply
+// is a whole line, an id is answered once, commands stay within the limits, are zero while the gateway listens, and do not rise in a latch.
 #include "fuzz_sequence.h"
 
 #include "../support/gateway_rig.h"
@@ -41,7 +41,7 @@ bool brd_serial_write(const char *bytes, size_t length) {
     iwn_line_t line;
     fuzz_require(length > 0U && bytes[length - 1U] == '\n' && memchr(bytes, '\n', length) == &bytes[length - 1U],
                  "one line");
-    fuzz_require(iwn_line_read(bytes, length - 1U, true, &line) == IWN_LINE_GOOD, "every line told is right");
+    fuzz_require(iwn_line_read(bytes, length - 1U, true, &line) == IWN_LINE_GOOD, "every line sent is correct");
     fuzz_require(line.t_us >= t_us, "time goes on");
     t_us = line.t_us;
     answers += (line.length >= 6U && line.channel == 1U && memcmp(line.json, "{\"id\":", 6) == 0) ? 1U : 0U;
@@ -65,21 +65,21 @@ bool brd_host_keep(const brd_settings_t *settings) {
     return true;
 }
 
-static brd_assumptions_t kept;
+static brd_assumptions_t stored;
 static bool has_kept;
 
 bool brd_host_read_assumptions(brd_assumptions_t *out_learned) {
-    *out_learned = kept;
+    *out_learned = stored;
     return has_kept;
 }
 
 bool brd_host_write_assumptions(const brd_assumptions_t *learned) {
-    kept = *learned;
+    stored = *learned;
     has_kept = true;
     return true;
 }
 
-static void say(uint8_t channel, const char *json, size_t length) {
+static void send_line(uint8_t channel, const char *json, size_t length) {
     const iwn_line_t line = {.json = json, .length = length, .channel = channel};
     wire_taken = 0;
     wire_length = iwn_line_write(&line, wire, IWN_LINE_BOARD_MAX);
@@ -88,9 +88,9 @@ static void say(uint8_t channel, const char *json, size_t length) {
     wire_length = wire_taken = 0;
 }
 
-/// The relay's own word.
-static void say_text(const char *json) {
-    say(0, json, strlen(json));
+/// Sends a line of the relay.
+static void send_text(const char *json) {
+    send_line(0, json, strlen(json));
 }
 
 static void judge(const int32_t before[IW_SIDES], bool was_latched) {
@@ -98,11 +98,11 @@ static void judge(const int32_t before[IW_SIDES], bool was_latched) {
     fuzz_require(rig.gateway.sender.envelope.stopped == 0U && rig.gateway.sender.sent.clamped == 0U,
                  "the gate has nothing to stop");
     for (size_t side = 0; side < IW_SIDES; side++) {
-        const int32_t told = rig.bus.commanded_mm_s[side];
-        fuzz_require(abs(told) <= rig.config.max_speed_mm_s, "within the limits");
-        fuzz_require(!was_latched || state != IW_STATE_LATCHED || abs(told) <= abs(before[side]),
+        const int32_t commanded = rig.bus.commanded_mm_s[side];
+        fuzz_require(abs(commanded) <= rig.config.max_speed_mm_s, "within the limits");
+        fuzz_require(!was_latched || state != IW_STATE_LATCHED || abs(commanded) <= abs(before[side]),
                      "a latch never goes faster");
-        moved += (told != 0) ? 1U : 0U;
+        moved += (commanded != 0) ? 1U : 0U;
     }
 }
 
@@ -111,19 +111,19 @@ static void pass(uint32_t span_ms) {
         const int32_t before[IW_SIDES] = {rig.bus.commanded_mm_s[IW_LEFT], rig.bus.commanded_mm_s[IW_RIGHT]};
         const bool was_latched = iw_gateway_state(&rig.gateway) == IW_STATE_LATCHED;
         if (ms % 100U == 0U) {
-            say_text("{\"cmd\":\"alive\"}"); // Else all ends after 500 ms.
+            send_text("{\"cmd\":\"alive\"}"); // Otherwise the board closes all channels after 500 ms.
         }
         gateway_rig_step(&rig);
         const iw_snapshot_t seen = gateway_rig_look(&rig);
         (void)brd_host_tell(&host, &seen, false);
-        rig.judge.violation = NULL; // It knows nothing of what was asked here.
+        rig.judge.violation = NULL; // The judge does not know the requests of this target.
         gateway_rig_run(&rig, 5000);
         judge(before, was_latched);
     }
 }
 
-/// With boot, number and stamp before what is asked.
-static void say_quoted(const uint8_t *text, size_t size) {
+/// Sends a request with boot, number and time stamp before its fields.
+static void send_quoted(const uint8_t *text, size_t size) {
     static char json[IWN_LINE_BOARD_MAX];
     const int head = snprintf(json, sizeof json, "{\"boot\":\"%016llx\",\"seq\":%llu,\"t_us\":%llu,",
                               (unsigned long long)BOOT, (unsigned long long)++seq, (unsigned long long)t_us);
@@ -131,7 +131,7 @@ static void say_quoted(const uint8_t *text, size_t size) {
     const size_t length = (size_t)head + size - skip;
     if (length < sizeof json) {
         memcpy(&json[head], &text[skip], size - skip);
-        say(1, json, length);
+        send_line(1, json, length);
     }
 }
 
@@ -145,16 +145,16 @@ static void act(const uint8_t *text, size_t size) {
         gateway_rig_press(&rig, text[0] == '^');
         pass(10);
     } else if (size > 0U && text[0] == 'q') {
-        say_quoted(&text[1], size - 1U);
+        send_quoted(&text[1], size - 1U);
     } else if (size > 0U && (text[0] == '@' || text[0] == '2')) {
-        say((text[0] == '2') ? 2 : 0, (const char *)&text[1], (size < IWN_LINE_BOARD_MAX - 32U) ? size - 1U : 0U);
+        send_line((text[0] == '2') ? 2 : 0, (const char *)&text[1], (size < IWN_LINE_BOARD_MAX - 32U) ? size - 1U : 0U);
     } else if (size < IWN_LINE_BOARD_MAX - 32U) {
-        say(1, (const char *)text, size);
+        send_line(1, (const char *)text, size);
     }
     pass(5);
 }
 
-/// Beside wheels that have been standing for a while. Done once: every input begins from a copy of this.
+/// Begins with wheels that have been at standstill for a while. Made once: every input begins with a copy.
 static void prepare(void) {
     gateway_rig_init(&rig);
     memset(&host, 0, sizeof host);
@@ -171,8 +171,8 @@ static void prepare(void) {
                                     .boot = BOOT};
     brd_host_init(&host, &place, rig.now_us);
     gateway_rig_run(&rig, 600000);
-    say_text("{\"cmd\":\"link\"}");
-    say_text("{\"cmd\":\"open\",\"channel\":1,\"watch\":false}");
+    send_text("{\"cmd\":\"link\"}");
+    send_text("{\"cmd\":\"open\",\"channel\":1,\"watch\":false}");
     pass(20);
 }
 
@@ -202,6 +202,6 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     }
     pass(100);
     fuzz_require(answers <= asked, "a request is answered once");
-    fuzz_tell((moved > 0U) ? "taken" : "refused");
+    fuzz_tell((moved > 0U) ? "accepted" : "refused");
     return 0;
 }

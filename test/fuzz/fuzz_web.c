@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Any bytes as what the web bridge reads itself: header values, path, arguments of a drive command, a recording's name. Nothing is let in without
-// the token and a name of ours, nothing is driven beyond the limits, and no name leads out of the recordings.
+// Any bytes as input that the web bridge parses itself: header values, path, arguments of a drive command, the name of a recording. No request passes
+// without the token and one of our host names, no command exceeds the limits, and no name leads out of the folder of recordings.
 #include "fuzz.h"
 
 #include "driver.h"
@@ -13,7 +13,7 @@
 static const char token[] = "00112233445566778899aabbccddeeff";
 static const char nonce[] = "0123456789abcdef0123456789abcdef";
 
-/// Cuts the bytes at each newline into texts of exactly their length: a byte read behind one is found. Missing ones are NULL.
+/// Cuts the bytes at each newline into texts of exactly their length, so the sanitizer finds a byte that is read after one. Missing texts are NULL.
 static void cut(const uint8_t *data, size_t size, char *fields[FIELDS]) {
     const uint8_t *const end = data + size;
     for (size_t i = 0; i < FIELDS; i++) {
@@ -52,15 +52,15 @@ static void judge_request(char *fields[FIELDS], bool drives) {
     const web_verdict_t verdict = web_judge(&rules, &asked);
     fuzz_require((verdict.status == 200U) == (verdict.route != NULL), "a route, or a refusal");
     fuzz_require(verdict.status == 200U || (verdict.error[0] != '\0' && verdict.message[0] != '\0'),
-                 "a refusal says why");
+                 "a refusal has a reason");
     if (verdict.status != 200U) {
         if (drives) {
             fuzz_tell("refused");
         }
         return;
     }
-    fuzz_tell("taken");
-    fuzz_require(asked.host != NULL && asked.host[0] != '\0', "no host, no answer");
+    fuzz_tell("accepted");
+    fuzz_require(asked.host != NULL && asked.host[0] != '\0', "without a host no route");
     fuzz_require(verdict.route->verb == WEB_FILE || verdict.route->verb == WEB_CHALLENGE ||
                      verdict.route->verb == WEB_STOP || proof == WEB_PROOF_FULL ||
                      (proof == WEB_PROOF_READ && strcmp(asked.method, "GET") == 0),
@@ -79,7 +79,7 @@ static void judge_drive(char *fields[FIELDS]) {
     const web_limits_t limits = {300, 300000};
     web_driver_begin(&driver, 0);
     if (web_driver_take(&driver, &command, &limits, 10000000U, &twist) == NULL) {
-        fuzz_tell("taken");
+        fuzz_tell("accepted");
         fuzz_require(twist.v_mm_s >= -300 && twist.v_mm_s <= 300 && twist.yaw_mrad_s >= -1000 &&
                          twist.yaw_mrad_s <= 1000,
                      "within the limits");
@@ -98,7 +98,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     judge_request(fields, true);
     judge_drive(fields);
     if (web_recording_name(fields[11])) {
-        fuzz_tell("taken");
+        fuzz_tell("accepted");
         fuzz_require(strlen(fields[11]) < WEB_NAME_SIZE && strpbrk(fields[11], "/\\\"% ") == NULL &&
                          fields[11][0] != '.' && strstr(fields[11], "..") == NULL,
                      "a bare name");

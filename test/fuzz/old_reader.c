@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The gateway's reader of requests as it was until version 0.1, on jansson, with the requests that came later: what the new one must
-// agree with. For tests only.
+// The gateway's reader of requests until version 0.1, on jansson, with the requests that were added later: the new reader must give the same
+// results. For tests only.
 #include "old_reader.h"
 
 #include "iwheel_northbound/text.h"
@@ -31,7 +31,7 @@ static void *arena_take(size_t size) {
 }
 
 static void arena_leave(void *block) {
-    (void)block; // All of it goes at once, by json_arena_reset.
+    (void)block; // json_arena_reset releases everything together.
 }
 
 static void install(void) {
@@ -50,12 +50,12 @@ typedef enum {
     FIELD_VALUE
 } field_kind_t;
 
-/// A field that some commands have. `cmd` and `id` are common to all and treated apart.
+/// A field of some commands. `cmd` and `id` are common to all and handled separately.
 typedef struct {
     const char *name;
-    size_t offset;    ///< Of the value in iwn_request_t.
-    size_t max;       ///< Of a text, in bytes.
-    uint32_t allowed; ///< Bit per iwn_cmd_t.
+    size_t offset;    ///< Offset of the value in iwn_request_t.
+    size_t max;       ///< Maximum length of a text in bytes.
+    uint32_t allowed; ///< One bit per iwn_cmd_t.
     bool required;
     field_kind_t kind;
 } field_t;
@@ -90,7 +90,7 @@ static const field_t fields[] = {
 };
 #define FIELDS (sizeof fields / sizeof fields[0])
 
-// The names alone are those of the description: test/northbound and the unit tests judge them.
+// The names are those of the description: test/northbound and the unit tests judge them.
 #define NAME(name) #name,
 #define WORD(name) " " #name
 static const char *const cmd_names[IWN_CMDS] = {IWN_REQUEST_NAMES(NAME)};
@@ -127,12 +127,12 @@ static bool too_deep(const char *line, size_t length) {
     return false;
 }
 
-/// Plain and short enough. jansson has checked the UTF-8 and refuses \u0000.
+/// True if the text is short enough and has no special characters. jansson has checked the UTF-8 and refuses \u0000.
 static bool is_plain(const char *text, size_t max) {
     return strlen(text) <= max && iwn_plain_text(text);
 }
 
-/// May stand in a message: nothing that could have been cut in the middle of a character.
+/// Returns the text if a message may quote it: no text that could be cut inside a character.
 static const char *quotable(const char *text, const char *otherwise) {
     for (const char *c = text; *c != '\0'; c++) {
         if (*c < 0x20 || *c > 0x7E) {
@@ -169,9 +169,9 @@ static bool read_integer(const field_t *field, const json_t *value, int64_t *tar
 }
 
 static bool read_topics(const json_t *value, uint8_t *target, iwn_refusal_t *out_refusal) {
-    static const char cure[] = "topics must be a list of these words: state bus estop lease stop force frame";
+    static const char advice[] = "topics must be a list of these words: state bus estop lease stop force frame";
     if (!json_is_array(value)) {
-        return refuse(out_refusal, IWN_BAD_VALUE, "%s", cure);
+        return refuse(out_refusal, IWN_BAD_VALUE, "%s", advice);
     }
     for (size_t i = 0; i < json_array_size(value); i++) {
         const char *word = json_string_value(json_array_get(value, i));
@@ -180,7 +180,7 @@ static bool read_topics(const json_t *value, uint8_t *target, iwn_refusal_t *out
             topic++;
         }
         if (word == NULL || topic == IWN_TOPICS) {
-            return refuse(out_refusal, IWN_BAD_VALUE, "%s", cure);
+            return refuse(out_refusal, IWN_BAD_VALUE, "%s", advice);
         }
         *target |= (uint8_t)(1U << topic);
     }
@@ -291,7 +291,7 @@ static const field_t *find_field(const char *name, iwn_cmd_t cmd) {
     return NULL;
 }
 
-/// Every field that is there is known and right.
+/// Judges every field of the request: known and valid.
 static bool read_fields(json_t *root, iwn_request_t *request, iwn_refusal_t *out_refusal) {
     for (void *it = json_object_iter(root); it != NULL; it = json_object_iter_next(root, it)) {
         const char *name = json_object_iter_key(it);
@@ -310,7 +310,7 @@ static bool read_fields(json_t *root, iwn_request_t *request, iwn_refusal_t *out
     return true;
 }
 
-/// Every field that must be there is.
+/// Judges whether every required field is present.
 static bool is_complete(const json_t *root, const iwn_request_t *request, iwn_refusal_t *out_refusal) {
     for (size_t i = 0; i < FIELDS; i++) {
         const bool needed = fields[i].required && (fields[i].allowed & BIT(request->cmd)) != 0U;

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the fuzz targets begin with: by hand, and from what the product itself recorded (test/recordings)."""
+"""The first inputs of the fuzz targets: written by hand, and from recordings of the product itself (test/recordings)."""
 
 import ast
 import collections
@@ -47,13 +47,13 @@ def json_vectors():
 
 
 def by_hand():
-    """{target: [bytes]}: also what a target must refuse."""
-    said = [line for path in (ROOT / "docs/user/northbound.md", ROOT / "README.md") for line in re.findall(r"\{\"[^`\n]*\}", path.read_text())]
+    """{target: [bytes]}: also inputs that a target must refuse."""
+    sample = [line for path in (ROOT / "docs/user/northbound.md", ROOT / "README.md") for line in re.findall(r"\{\"[^`\n]*\}", path.read_text())]
     drives = bytes([0, 1, 15, 1, 60, 1, 60, 11, 4, 0, 10, 11, 0, 10, 3, 232, 5, 3, 232, 5, 0, 40, 2, 200, 10, 0, 11, 2, 88, 9, 2, 88, 9, 0, 60])
     return {
         "codec": [bytes([n, 8, 0, *range(8)]) for n in range(len(IDS))] + [b"\xff\x80\x00\x01\x0a\x08\x00" + bytes(8)],
         "gateway": [drives, drives + bytes([8, 0, 2, 1]) + drives, bytes([2]) + drives[1:]],
-        "request": [line.encode() for line in said]
+        "request": [line.encode() for line in sample]
         + json_vectors()
         + [b'{"cmd":"drive","left_mm_s":1e2,"right_mm_s":-1,"id":"x"}']
         + [b'{"cmd":"recording","name":"' + name + b'","offset":-1}' for name in (b"../x", b"a" * 64, b"stop-000001-a.log\\u0000", b"")],
@@ -98,19 +98,19 @@ def by_hand():
         "session": [
             b"".join(
                 b"%s%s\n+5\n" % (b"q" if b'"drive"' in line or b'"twist"' in line else b"", line)
-                for line in (text.encode() for text in said)
+                for line in (text.encode() for text in sample)
                 if b'"cmd"' in line
             ),
             *relayed(),
         ],
-        "client": [b"\0" + told for told in states()]
-        + [b"\x90" + told for told in greetings()]
-        + [bytes([how]) + b"".join(line.encode() + b"\n" for line in said if "cmd" not in line) for how in (0, 1, 2, 7, 15, 16, 255)],
+        "client": [b"\0" + chunk for chunk in states()]
+        + [b"\x90" + chunk for chunk in greetings()]
+        + [bytes([how]) + b"".join(line.encode() + b"\n" for line in sample if "cmd" not in line) for how in (0, 1, 2, 7, 15, 16, 255)],
     }
 
 
 def checked(text):
-    """As the file of what is known of the wheels is written: with its checksum."""
+    """The text with its checksum, as the assumption store writes its file."""
     return text + b"%08x\n" % zlib.crc32(text)
 
 
@@ -126,7 +126,7 @@ def odd_values():
 
 
 def states():
-    """What a gateway tells of itself, with values of each kind."""
+    """States that a gateway reports, with values of each kind."""
     wheel = {
         "heard": True,
         "at_rest": False,
@@ -164,8 +164,8 @@ def states():
 def greetings():
     hello = {"event": "hello", "api": 1, "client": 3}
     return [
-        json.dumps(told).encode() + b"\n"
-        for told in (
+        json.dumps(chunk).encode() + b"\n"
+        for chunk in (
             hello,
             {**hello, "api": 2},
             {**hello, "rights": "watch"},
@@ -177,9 +177,9 @@ def greetings():
 
 
 def mqtt_odd():
-    """Commands of every kind, as retained ones, of others, late, early, to a bridge that only watches; with a response topic and correlation data."""
+    """Commands of every kind: retained, of others, late, early, to a bridge that only watches; with a response topic and correlation data."""
 
-    def said(**more):
+    def sample(**more):
         return b"\n" + json.dumps({"from": "a", "seq": 1, "boot": "0123456789abcdef", "t_us": 49900000} | more).encode()
 
     verbs = ("hello", "stop", "estop", "arm", "drive", "twist", "reset", "why", "recordings", "recording", "fly")
@@ -198,15 +198,15 @@ def mqtt_odd():
         {"reason": None},
     )
     return (
-        [flag + verb.encode() + said() for verb in verbs for flag in (b"", b"!", b"#", b"-", b"+")]
-        + [verb + said(**more) for more in fields for verb in (b"estop", b"drive")]
-        + [b"stop\t" + topic + b"\tlabel" + said() for topic in (b"iwheel/w1/reply/b", b"iwheel/w2/reply/b", b"iwheel/w1/reply/b+", b"")]
-        + [b"stop\tiwheel/w1/reply/b\t" + b"x" * 65 + said()]
+        [flag + verb.encode() + sample() for verb in verbs for flag in (b"", b"!", b"#", b"-", b"+")]
+        + [verb + sample(**more) for more in fields for verb in (b"estop", b"drive")]
+        + [b"stop\t" + topic + b"\tlabel" + sample() for topic in (b"iwheel/w1/reply/b", b"iwheel/w2/reply/b", b"iwheel/w1/reply/b+", b"")]
+        + [b"stop\tiwheel/w1/reply/b\t" + b"x" * 65 + sample()]
     )
 
 
 def memory_items():
-    """An entry of each kind, of the bus and of the operator, that can be."""
+    """An entry of each possible kind, from the bus and from the operator."""
     bus = (
         ("setpoint_type", 1000, "255"),
         ("force_unit_left", 10000, "cN"),
@@ -237,8 +237,8 @@ def memory_items():
     row = '"%s":{"state":"%s","evidence":"%s","figure":%d,"value":"%s","found":"%s","since_wall_us":1%s}'
     return [
         (row % (name, state, "bus", figure, value, "", "")).encode()
-        for state, told in (("confirmed", bus), ("contradicted", against))
-        for name, figure, value in told
+        for state, chunk in (("confirmed", bus), ("contradicted", against))
+        for name, figure, value in chunk
     ] + [
         (row % (name, state, "operator", 0, value, found, ',"how":"measured"')).encode()
         for state in ("confirmed", "contradicted")
@@ -247,7 +247,7 @@ def memory_items():
 
 
 def memory():
-    """What is known of the wheels: nothing, something, and with an offset."""
+    """Files of the assumption store: empty, with entries, and with an offset."""
     items = (
         b"",
         b'"setpoint_type":{"state":"confirmed","evidence":"bus","figure":850,"value":"255","found":"","since_wall_us":0}',
@@ -263,7 +263,7 @@ def ledger(items, offsets):
 
 
 def relayed():
-    """What a board is told beside requests: by its relay, by a second client, of its configuration and of what is known."""
+    """Further input of a board: from its relay, from a second client, about its configuration and its assumptions."""
     keys = (
         "wheels.gear_ratio=3/2",
         "wheels.gear_ratio=0/1",
@@ -324,7 +324,7 @@ def rows():
 
 
 def some_of_each(number):
-    """Of each id the first frames that differ."""
+    """For each id the first frames that differ."""
     seen = collections.defaultdict(dict)
     for frame in frames():
         if len(seen[frame[1]]) < number:
@@ -333,26 +333,26 @@ def some_of_each(number):
 
 
 def codec():
-    """As take_frame() of fuzz_codec.c reads them: one by one, and a drive in its order."""
-    told = [bytes([IDS.index(number), len(data), ECHO if own else 0]) + data.ljust(8, b"\0") for _, number, data, own in some_of_each(6)]
-    return [*told, b"".join(told)]
+    """Frames in the form that take_frame() of fuzz_codec.c reads: one by one, and a drive in its order."""
+    chunk = [bytes([IDS.index(number), len(data), ECHO if own else 0]) + data.ljust(8, b"\0") for _, number, data, own in some_of_each(6)]
+    return [*chunk, b"".join(chunk)]
 
 
 def candump():
-    """The log in parts: where the gateway is silent, where it drives, where it stops."""
+    """Parts of the log: where the gateway is silent, where it drives, where it stops."""
     lines = [line for line, *_ in frames()]
     first = next(at for at, frame in enumerate(frames()) if frame[3])
     return ["\n".join(part).encode() for part in (lines[:20], lines[first - 5 : first + 25], lines[-20:], [line for line, *_ in some_of_each(3)])]
 
 
 def request():
-    """What iwheelctl and the Python client say to a gateway."""
+    """The requests that iwheelctl and the Python client send to a gateway."""
     return [line.encode() for line in (RECORDED.parent / "requests.jsonl").read_text().splitlines()]
 
 
 def line():
-    """The same as the relay says it, on a channel and with a CRC."""
-    return [b"1 " + said + b"\xfe" for said in request() if len(said) < 400]
+    """The same requests from the relay, on a channel and with a CRC."""
+    return [b"1 " + sample + b"\xfe" for sample in request() if len(sample) < 400]
 
 
 def config():
@@ -360,14 +360,14 @@ def config():
 
 
 def client():
-    """What the gateway noted of itself, told as events."""
+    """The gateway's own notes, as events."""
     lines = [json.dumps({"event": row["type"], **row}).encode() + b"\n" for row in rows()]
     return [b"\0" + line for line in lines[:20]] + [bytes([how]) + b"".join(lines[:60]) for how in (0, 1, 8, 40)]
 
 
 def mqtt():
-    """Commands that fuzz_mqtt.c takes, and a spool's file with two events of which one is confirmed."""
-    said = b'\n{"from":"far","seq":7,"boot":"0123456789abcdef","t_us":49900000'
+    """Commands that fuzz_mqtt.c accepts, and a spool's file with two events of which one is confirmed."""
+    sample = b'\n{"from":"far","seq":7,"boot":"0123456789abcdef","t_us":49900000'
     verbs = (b"stop", b"arm", b"why", b"estop", b"drive", b"recording")
     fields = (b"", b"", b',"ttl_ms":500', b',"reason":"in the way"', b',"left_mm_s":100,"right_mm_s":-5', b',"name":"stop-000001-estop_line.log","offset":0')
 
@@ -376,14 +376,16 @@ def mqtt():
         return len(body).to_bytes(4, "little") + zlib.crc32(body).to_bytes(4, "little") + body
 
     events = [record(b"e", number, b"stop\0" + b'{"number":%d}' % number) for number in (1, 2)]
-    return [verb + said + more + b"}" for verb, more in zip(verbs, fields, strict=False)] + [b"iwspool1" + record(b"c", 0) + b"".join(events) + record(b"c", 1)]
+    return [verb + sample + more + b"}" for verb, more in zip(verbs, fields, strict=False)] + [
+        b"iwspool1" + record(b"c", 0) + b"".join(events) + record(b"c", 1)
+    ]
 
 
 def web():
-    """As a browser asks, with the token of fuzz_web.c: to look, and to drive."""
+    """Requests of a browser with the token of fuzz_web.c: to watch, and to drive."""
     token = b"00112233445566778899aabbccddeeff"
     session, nonce = b"a" * 32, b"0123456789abcdef" * 2
-    said = b"127.0.0.1:8470\nhttp://127.0.0.1:8470\nsame-origin\n"
+    sample = b"127.0.0.1:8470\nhttp://127.0.0.1:8470\nsame-origin\n"
     drive = b"\n" + token + b"\n9900000\n1\n200\n-100\nstop-000001-estop_line.jsonl"
 
     def proof(method, target):
@@ -392,7 +394,7 @@ def web():
 
     reads = b"Bearer " + hmac.new(token, b"iwheel-web read", hashlib.sha256).hexdigest()[:32].encode()
     asked = [(b"GET", b"/api/events"), (b"POST", b"/api/drive")]
-    return [b"\n".join((*one, said + proof(*one))) + drive for one in asked] + [b"GET\n/metrics\n" + said + reads + drive]
+    return [b"\n".join((*one, sample + proof(*one))) + drive for one in asked] + [b"GET\n/metrics\n" + sample + reads + drive]
 
 
 def put(number, data, own):
@@ -403,7 +405,7 @@ def put(number, data, own):
 
 
 def do(row):
-    """A request, or what the button says, in the world of fuzz_gateway.c."""
+    """A request, or a reading of the button, in the world of fuzz_gateway.c."""
     if row["type"] == "arm":
         return bytes([10, 4])
     if row["type"] == "drive":
@@ -414,40 +416,40 @@ def do(row):
 
 
 def windows():
-    """The parts of the recording in which something is decided, [(from, to)]: before arm until it drives, and about the stop."""
+    """The parts of the recording that contain decisions, [(from, to)]: before arm until it drives, and around the stop."""
     armed_us = next(row["t_us"] for row in rows() if row["type"] == "arm")
     latched_us = next(row["t_us"] for row in rows() if row["type"] == "state" and row["state"] == "latched")
     return (armed_us - 300_000, armed_us + 80_000), (latched_us - 40_000, latched_us + 10_000)
 
 
 def gateway():
-    """The recording as fuzz_gateway.c is told it: until it drives; and from there on to the stop."""
-    told, taken, done_us, seen, parts = bytes([0, 1, 15]), 0, None, frames(), []
+    """The recording as input of fuzz_gateway.c: until it drives, and then until the stop."""
+    chunk, used, done_us, seen, parts = bytes([0, 1, 15]), 0, None, frames(), []
     for begin_us, end_us in windows():
         for row in rows():
-            new = seen[taken : row.get("frames", 0)]
-            taken = max(taken, row.get("frames", 0))
+            new = seen[used : row.get("frames", 0)]
+            used = max(used, row.get("frames", 0))
             if not begin_us <= row.get("t_us", 0) <= end_us:
                 done_us = None
                 continue
             if row["type"] != "step":
-                told += b"".join(put(number, data, own) for _, number, data, own in new[-16:]) + do(row)
+                chunk += b"".join(put(number, data, own) for _, number, data, own in new[-16:]) + do(row)
                 continue
-            # What came while the gateway was held up: some frames, some time, and so on.
+            # Input that came while the gateway did not run: some frames, some time, and so on.
             units = (row["t_us"] - (done_us or row["t_us"])) // 100
             done_us = (done_us or row["t_us"]) + units * 100
             parts_of = max(1, -(-units // 200), -(-len(new) // 16))
             for part in range(parts_of):
                 some = new[len(new) * part // parts_of : len(new) * (part + 1) // parts_of]
-                told += b"".join(put(number, data, own) for _, number, data, own in some)
-                told += bytes([2, units * (part + 1) // parts_of - units * part // parts_of])
-        parts.append(told)
-        taken = 0
+                chunk += b"".join(put(number, data, own) for _, number, data, own in some)
+                chunk += bytes([2, units * (part + 1) // parts_of - units * part // parts_of])
+        parts.append(chunk)
+        used = 0
     return parts
 
 
 def recorded():
-    """{target: [bytes]}: a target that does not take them has lost what it was for."""
+    """{target: [bytes]}: a target that does not accept them no longer tests its code."""
     return {
         "codec": codec(),
         "gateway": gateway(),

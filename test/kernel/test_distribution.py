@@ -65,11 +65,11 @@ class Distribution(unittest.TestCase):
         with mock.patch.object(distribution, "ROOT", self.folder), answers(""):
             return distribution.why_not_emulated("arm64")
 
-    def test_another_architecture_takes_its_kernel_from_its_own_files(self):
+    def test_foreign_architecture_uses_kernel_of_its_own_files(self):
         self.assertIsNone(self.foreign("iwheel-gateway_1_arm64.deb", "iwheel-tools_1_arm64.deb"))
         self.assertTrue(os.path.exists(os.path.join(self.folder, "iwheel", "distribution-arm64", "vmlinuz")))
 
-    def test_another_architecture_without_our_packages_is_told_with_the_cure(self):
+    def test_foreign_architecture_without_packages_names_the_fix(self):
         self.assertIn("no packages for arm64: ./check cross", self.foreign("iwheel-gateway_1_arm64.deb"))
 
     def test_image_has_what_a_link_leads_to_and_the_folders_above(self):

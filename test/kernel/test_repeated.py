@@ -46,7 +46,7 @@ class Campaigns(unittest.TestCase):
         self.run_main(["--repeat", "3", "--seed", "7"], [[result("row12_glitch")]] * 3)
         self.assertEqual([7, 8, 9], [call.args[0].seed for call in self.once.call_args_list])
 
-    def test_one_failure_in_a_row_fails_it_and_is_named_with_its_seed(self):
+    def test_repeat_with_one_failed_campaign_fails_and_names_seed(self):
         good, bad = [result("row12_glitch")], [result("row12_glitch", "failed")]
         code, lines = self.run_main(["--repeat", "3"], [good, bad, good])
         self.assertEqual(1, code)
@@ -71,7 +71,7 @@ class Summary(unittest.TestCase):
         self.assertIn("1 of 2 tests passed every time", lines)
         self.assertIn("estop/row12_glitch was not judged in 1 of 1, with seed 1", lines)
 
-    def test_presses_of_all_campaigns_are_taken_together_but_the_times_are_not(self):
+    def test_presses_of_campaigns_are_merged_but_times_are_not(self):
         virtual = result("row11_presses_low", latencies=[1000, 2000], from_level=[9000])
         real = result("row11_presses_real_time", group="realtime", latencies=[8000], from_level=[3000])
         lines = list(repeated.summary([outcome(1, virtual, real), outcome(2, virtual, real)], 2))

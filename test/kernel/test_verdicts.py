@@ -70,7 +70,7 @@ class Verdicts(Witnessed):
             with self.subTest(failures):
                 self.assertEqual(("inconclusive", RETRIES), self.outcome(*failures))
 
-    def test_repeated_only_when_the_machine_has_been_quiet_for_a_second_or_patience_ends(self):
+    def test_repeat_waits_for_a_quiet_second_or_end_of_patience(self):
         clock, run = [10.0], Scripted(GAP)
         self.late(12_000_000, 200_000)
         with mock.patch("verdict.now_us", lambda: int(clock[0] * 1e6)), mock.patch("verdict.time") as time:

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""The manual pages of a build say what its programs print. They are made without running any, so the programs are asked here.
+"""The manual pages of a build contain the text that its programs print. The build does not run the programs; this test does.
 
 Usage: test_pages.py BUILD [unittest's arguments]
 """
@@ -45,7 +45,7 @@ def literal(text):
 
 class Pages(unittest.TestCase):
     def page(self, name):
-        """What scdoc was given."""
+        """Returns the input of scdoc."""
         with open(os.path.join(BUILD, "man", name + ".scd"), encoding="utf-8") as file:
             return file.read()
 
@@ -57,7 +57,7 @@ class Pages(unittest.TestCase):
         page = self.page(name)
         if block not in page:
             missing = [line for line in block.splitlines() if line not in page.splitlines()]
-            self.fail(f"man/{name}.scd of the build has not what is printed: " + "\n".join(missing or ["each line of it, but not in this order"]))
+            self.fail(f"man/{name}.scd of the build lacks what the program prints: " + "\n".join(missing or ["each line of it, but not in this order"]))
 
     def test_each_page_has_the_help_of_its_program(self):
         for name in built(FOLDERS):
@@ -71,13 +71,13 @@ class Pages(unittest.TestCase):
             with self.subTest(verb):
                 self.expect_block("iwheelctl.1", f"## {verb}\n" + literal(output("iwheelctl", verb, "--help")))
 
-    def test_commands_of_the_simulator_are_those_that_a_running_one_lists(self):
+    def test_simulator_commands_are_those_that_a_running_one_lists(self):
         with tempfile.TemporaryDirectory() as folder:
             control = os.path.join(folder, "control")
             command = [program("iwheel-sim"), "--quiet", "--can", f"unix:{folder}/bus", "--estop", f"{folder}/button", "--control", control]
             with subprocess.Popen(command, stdout=subprocess.DEVNULL) as simulator, socket.socket(socket.AF_UNIX) as client:
                 try:
-                    while client.connect_ex(control) != 0 and simulator.poll() is None:  # The file is there before anybody listens.
+                    while client.connect_ex(control) != 0 and simulator.poll() is None:  # The file exists before the simulator accepts connections.
                         time.sleep(0.01)
                     self.expect_printed("iwheel-sim.1", output("iwheel-sim", "--control", control, "help"))
                 finally:
@@ -98,7 +98,7 @@ class Pages(unittest.TestCase):
                 with self.subTest(name), open(path, "rb") as file:
                     made = subprocess.run(["scdoc"], input=self.page(name).encode(), capture_output=True, check=True)
                     self.assertEqual(made.stderr, b"")
-                    # The first lines have the day on which it was made.
+                    # The first lines contain the day of the build.
                     self.assertEqual(file.read().split(b"\n.SH", 1)[1], made.stdout.split(b"\n.SH", 1)[1])
 
 
@@ -109,7 +109,7 @@ class Missing(unittest.TestCase):
             page.flush()
             return subprocess.run([sys.executable, os.path.join(ROOT, "scripts", "man_pages.py"), page.name], capture_output=True, check=False).returncode
 
-    def test_a_page_of_what_is_not_there_is_none(self):
+    def test_page_without_its_program_is_an_error(self):
         self.assertEqual(self.renew("; file share/gateway.conf"), 0)
         self.assertNotEqual(self.renew("; file share/gone.conf"), 0)
         self.assertNotEqual(self.renew("; help iwheelctl"), 0)
@@ -118,5 +118,5 @@ class Missing(unittest.TestCase):
 if __name__ == "__main__":
     BUILD = os.path.abspath(sys.argv.pop(1))
     for absent in sorted(set(FOLDERS) - set(built(FOLDERS))):
-        print(f"note: the page of {absent} is not looked at: it was not built")
+        print(f"note: the page of {absent} is not checked: the program was not built")
     unittest.main()

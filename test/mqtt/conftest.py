@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The MQTT bridge on simulated wheels, with a real broker: what it tells, what it carries out and what it drops, and that no stop is lost.
+"""The MQTT bridge on simulated wheels, with a real broker: what it publishes, carries out and drops, and that no stop is lost.
 
-Brokers are Debian's mosquitto and nats-server, the client from outside is PyPI's paho-mqtt. What is missing is skipped, and said so. figures.py puts what
-was sent, arrived and doubled into docs/user/mqtt.md.
+Brokers are Debian's mosquitto and nats-server, the outside client is PyPI's paho-mqtt. Tests without their programs are skipped, with the reason. figures.py
+writes the numbers of events sent, arrived and doubled into docs/user/mqtt.md.
 """
 
 import pytest

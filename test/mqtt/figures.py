@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Writes what was sent, arrived and doubled in the tests and in the hours in virtual time into docs/user/mqtt.md.
+"""Writes the numbers of events sent, arrived and doubled in the tests, and in the hours in virtual time, into docs/user/mqtt.md.
 
 usage: IWHEEL_FIGURES=FILE IWHEEL_FULL=1 .venv/bin/pytest test/mqtt (as often as you like), then test/mqtt/figures.py BUILD FILE
 """
@@ -19,7 +19,7 @@ HEAD = ["| fault | tried | events sent | arrived | doubled | the longest until o
 
 
 def sum_up(rows):
-    """One row for each fault: tries, events sent, arrived and doubled of all its trials, and the longest of them."""
+    """One row for each fault: trials, events sent, arrived and doubled in all its trials, and the longest time of them."""
     faults = {}
     for fault, often, sent, arrived, doubled, longest_s in rows:
         before = faults.get(fault, (0, 0, 0, 0, 0))
@@ -30,7 +30,7 @@ def sum_up(rows):
 
 
 def rows_in(text):
-    """(fault, how often, events sent, arrived, doubled, seconds until the last arrived)"""
+    """(fault, number of trials, events sent, arrived, doubled, seconds until the last arrived)"""
     lines = [line.removeprefix("figures: ").split(" | ") for line in text.splitlines() if line.startswith("figures: ")]
     return [(fault, *map(int, numbers), float(longest.split()[0])) for fault, *numbers, longest in lines]
 

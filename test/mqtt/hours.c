@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // An hour without network in virtual time: the bridge's own code with libmosquitto, and the gateway's own loop (hours_rig.h), while the button
-// stops the wheels all the time. The broker is this program's: MQTT 3.1.1 on loopback, as much as the bridge speaks, with a line to it that
-// can be cut behind any byte. It keeps a book of what arrives. See --help.
+// stops the wheels again and again. The broker is part of this program: MQTT 3.1.1 on loopback, as far as the bridge needs it, with a line that
+// can be cut after any byte. It records what arrives. See --help.
 //
-// libmosquitto and its socket live in real time: what is sent over loopback has come when send() returns, so nothing is waited for but the
+// libmosquitto and its socket run in real time: bytes sent over loopback have arrived when send() returns, so the program waits only for the
 // thread that connects.
 #include "hours_rig.h"
 #include "mqtt_bridge.h"
@@ -22,32 +22,32 @@
 #define EVENTS_MAX 20000U
 #define TRIES_MAX  1000U
 #define WHOLE      (-1L)
-/// A line that is cut carries at most so many, some three states.
+/// A cut line carries at most this many bytes, about three states.
 #define LINE_BYTES 20000U
 
-/// The other end.
+/// The broker's end of the line.
 typedef struct {
     int listener; ///< -1: the network is cut.
-    int fd;       ///< -1: nobody is connected.
+    int fd;       ///< -1: no connection.
     uint16_t port;
-    long left; ///< Bytes until the line is cut, which begins anew then; WHOLE.
-    bool mute; ///< What it answers is lost on its way.
+    long left; ///< Bytes until the line is cut, after which the next count begins; or WHOLE.
+    bool mute; ///< Its replies are lost.
     uint8_t in[65536];
     size_t length;
 } far_t;
 
-/// What has arrived there of events.
+/// The events that have arrived.
 typedef struct {
     bool seen[EVENTS_MAX];
     uint64_t newest;
-    unsigned arrived; ///< Different ones.
+    unsigned arrived; ///< Different events.
     unsigned doubled;
-    unsigned disordered; ///< New ones after newer ones.
+    unsigned disordered; ///< New events after newer ones.
     unsigned states;
     unsigned stops;
-    int64_t stop_number; ///< Of the newest stop, as the gateway counts.
+    int64_t stop_number; ///< The gateway's number of the newest stop.
     unsigned stop_gaps;
-    uint64_t latest_us; ///< The longest from the gateway's `t_us` to its arrival.
+    uint64_t latest_us; ///< Longest time from the gateway's `t_us` to the arrival.
 } book_t;
 
 static mqtt_bridge_t bridge;
@@ -56,9 +56,9 @@ static char folder[64];
 static far_t far = {.listener = -1, .fd = -1, .left = WHOLE};
 static book_t book;
 static int client = -1;
-static double hours = 1.0; ///< Of the first two.
+static double hours = 1.0; ///< Duration of the first two trials.
 static uint32_t dice = 1;
-static uint64_t tries_us[TRIES_MAX]; ///< When the bridge tried to connect.
+static uint64_t tries_us[TRIES_MAX]; ///< Times of the bridge's attempts to connect.
 static unsigned tries;
 static unsigned cuts;
 
@@ -78,7 +78,7 @@ static void cut_network(void) {
     far.listener = -1;
 }
 
-static void mend_network(void) {
+static void restore_network(void) {
     const int one = 1;
     struct sockaddr_in address = {
         .sin_family = AF_INET, .sin_addr.s_addr = htonl(INADDR_LOOPBACK), .sin_port = htons(far.port)};
@@ -97,7 +97,7 @@ static uint64_t number_behind(const char *text, const char *name) {
     return strtoull(at + strlen(name), NULL, 10);
 }
 
-/// An event as it came; `id` is boot and number.
+/// Records an event that arrived; `id` is boot and number.
 static void write_down(const char *event) {
     const char *id = strstr(event, "\"id\":\"");
     TEST_ASSERT_NOT_NULL_MESSAGE(id, event);
@@ -170,7 +170,7 @@ static void take_packet(uint8_t head, const uint8_t *body, size_t length) {
     }
 }
 
-/// One packet of what has come; its length with its head, 0: it is not whole yet.
+/// Handles one received packet. Returns its length with its head; 0 if it is not complete yet.
 static size_t take_one(const uint8_t *bytes, size_t length) {
     size_t body = 0;
     for (size_t i = 1; i < 5U && i < length; i++) {
@@ -204,10 +204,10 @@ static void serve(void) {
     if (far.fd < 0 && far.listener >= 0) {
         far.fd = accept4(far.listener, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC);
     }
-    size_t room = sizeof far.in - far.length;
-    room = (far.left != WHOLE && (size_t)far.left < room) ? (size_t)far.left : room;
-    const ssize_t got = (far.fd >= 0 && room > 0U) ? recv(far.fd, far.in + far.length, room, 0) : -1;
-    if (far.fd >= 0 && got == 0 && room > 0U) {
+    size_t space = sizeof far.in - far.length;
+    space = (far.left != WHOLE && (size_t)far.left < space) ? (size_t)far.left : space;
+    const ssize_t got = (far.fd >= 0 && space > 0U) ? recv(far.fd, far.in + far.length, space, 0) : -1;
+    if (far.fd >= 0 && got == 0 && space > 0U) {
         hang_up();
     }
     far.length += (got > 0) ? (size_t)got : 0U;
@@ -245,7 +245,7 @@ static void pass(unsigned for_ms) {
     }
 }
 
-/// Armed, driven, stopped by the button, loosened again: some eight events. Takes three seconds.
+/// Arms, drives, stops by the button and resets: about eight events in three seconds.
 static void stop_once(void) {
     daemon_rig_arm(client);
     daemon_rig_drive(client, 100, 100, 60);
@@ -273,7 +273,7 @@ static void stop_all_the_time(unsigned for_ms, unsigned every_ms) {
     }
 }
 
-/// Until all that waits has been confirmed.
+/// Waits until all waiting events have been confirmed.
 static void drain(void) {
     for (unsigned ms = 0; ms < 120000U && bridge.spool.waiting > 0U; ms += PASS_MS) {
         pass(PASS_MS);
@@ -292,7 +292,7 @@ void setUp(void) {
     far.left = WHOLE;
     daemon_rig_begin();
     client = daemon_rig_connect();
-    mend_network();
+    restore_network();
 }
 
 void tearDown(void) {
@@ -318,8 +318,8 @@ static void begin(unsigned spool_kB, unsigned every_ms) {
     TEST_ASSERT_EQUAL_INT(MQTT_UP, bridge.broker.state);
 }
 
-/// The line that test/mqtt/figures.py puts into docs/user/mqtt.md.
-static void tell(const char *fault, unsigned often) {
+/// Prints the line that test/mqtt/figures.py writes into docs/user/mqtt.md.
+static void print_figures(const char *fault, unsigned often) {
     (void)printf("figures: %s | %u | %llu | %u | %u | %.1f s\n", fault, often, (unsigned long long)bridge.spool.last,
                  book.arrived, book.doubled, (double)book.latest_us / 1e6);
     (void)fflush(stdout);
@@ -343,9 +343,9 @@ static void test_network_cut_for_an_hour_each_event_once_in_order(void) {
     TEST_ASSERT_GREATER_THAN_size_t_MESSAGE((size_t)(2000.0 * hours), bridge.spool.waiting,
                                             "events of 360 stops an hour wait");
     const unsigned tried = tries;
-    mend_network();
+    restore_network();
     drain();
-    // It tries for ever, soon at first, then every 15 s to 30 s, and is there again within 30 s.
+    // The bridge retries forever, soon at first, then every 15 s to 30 s, and is connected within 30 s.
     TEST_ASSERT_LESS_THAN_UINT64(1500000U, tries_us[0] - cut_us);
     for (unsigned i = 6; i < tries; i++) {
         const uint64_t gap_us = tries_us[i] - tries_us[i - 1U];
@@ -354,14 +354,14 @@ static void test_network_cut_for_an_hour_each_event_once_in_order(void) {
     TEST_ASSERT_EQUAL_UINT(tried + 1U, tries);
     assert_each_once_in_order();
     (void)printf("        tried %u times in that hour; %u stops among the events\n", tried, book.stops);
-    tell("network cut for an hour (virtual time), 360 stops meanwhile", 1);
+    print_figures("network cut for an hour (virtual time), 360 stops meanwhile", 1);
 }
 
-static void test_network_cut_for_an_hour_spool_full_the_oldest_are_dropped_and_counted(void) {
+static void test_network_cut_for_an_hour_full_spool_counts_the_dropped(void) {
     begin((unsigned)(256.0 * hours), 5000);
     cut_network();
     stop_all_the_time(hours_ms(), 10000);
-    mend_network();
+    restore_network();
     drain();
     TEST_ASSERT_GREATER_THAN_UINT64(0, bridge.spool.dropped);
     TEST_ASSERT_EQUAL_UINT64_MESSAGE(bridge.spool.last, book.arrived + bridge.spool.dropped, "arrived or counted");
@@ -372,7 +372,7 @@ static void test_network_cut_for_an_hour_spool_full_the_oldest_are_dropped_and_c
     char fault[96];
     (void)snprintf(fault, sizeof fault, "the same with `max_kB = 256`: %llu dropped and counted, the oldest",
                    (unsigned long long)bridge.spool.dropped);
-    tell(fault, 1);
+    print_figures(fault, 1);
 }
 
 static void test_network_cut_behind_any_byte_each_event_once_in_order(void) {
@@ -382,12 +382,12 @@ static void test_network_cut_behind_any_byte_each_event_once_in_order(void) {
     far.left = WHOLE;
     drain();
     TEST_ASSERT_GREATER_THAN_UINT((unsigned)(100.0 * hours), cuts);
-    TEST_ASSERT_GREATER_THAN_UINT_MESSAGE(0, book.doubled, "what makes doubles was met");
+    TEST_ASSERT_GREATER_THAN_UINT_MESSAGE(0, book.doubled, "the trial causes doubles");
     assert_each_once_in_order();
-    tell("connection cut behind any byte, in 20 minutes of virtual time", cuts);
+    print_figures("connection cut behind any byte, in 20 minutes of virtual time", cuts);
 }
 
-static void test_state_comes_as_often_as_configured_though_the_bridge_is_woken_unevenly(void) {
+static void test_state_with_uneven_wake_ups_comes_at_configured_rate(void) {
     static const unsigned every_ms[] = {100, 500, 1000, 5000};
     for (size_t i = 0; i < sizeof every_ms / sizeof every_ms[0]; i++) {
         const unsigned wanted = 60000U / every_ms[i];
@@ -399,7 +399,7 @@ static void test_state_comes_as_often_as_configured_though_the_bridge_is_woken_u
             pass(50);
             hours_run_gateway(10);
         }
-        // TCP takes its time by the real clock, in which that minute was a moment.
+        // TCP needs real time, in which that minute was only a moment.
         for (unsigned tries_left = 100; tries_left > 0U && book.states < wanted; tries_left--) {
             struct pollfd more = {.fd = far.fd, .events = POLLIN};
             (void)poll(&more, 1, 10);
@@ -409,7 +409,7 @@ static void test_state_comes_as_often_as_configured_though_the_bridge_is_woken_u
         TEST_ASSERT_TRUE(mqtt_bridge_close(&bridge));
         serve();
     }
-    begin(1024, 5000); // For tearDown.
+    begin(1024, 5000); // tearDown needs an open bridge.
 }
 
 int main(int count, char **arguments) {
@@ -424,9 +424,9 @@ int main(int count, char **arguments) {
     }
     hours = (count > 1) ? strtod(arguments[1], NULL) : hours;
     UNITY_BEGIN();
-    RUN_TEST(test_state_comes_as_often_as_configured_though_the_bridge_is_woken_unevenly);
+    RUN_TEST(test_state_with_uneven_wake_ups_comes_at_configured_rate);
     RUN_TEST(test_network_cut_for_an_hour_each_event_once_in_order);
-    RUN_TEST(test_network_cut_for_an_hour_spool_full_the_oldest_are_dropped_and_counted);
+    RUN_TEST(test_network_cut_for_an_hour_full_spool_counts_the_dropped);
     RUN_TEST(test_network_cut_behind_any_byte_each_event_once_in_order);
     return UNITY_END();
 }

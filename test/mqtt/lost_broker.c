@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // A lost broker while an MQTT client drives: the bridge's own code and the gateway's own loop in virtual time (hours_rig.h). There is no broker; the
-// commands and the loss are handed to the bridge as its connection hands them over.
+// test calls the bridge with commands and with the loss, as its connection does.
 #include "hours_rig.h"
 #include "mqtt_bridge.h"
 
@@ -18,7 +18,7 @@ static mqtt_bridge_t bridge;
 static mqtt_settings_t settings;
 static char folder[64];
 static unsigned sequence;
-static char key[MQTT_KEY_SIZE]; ///< Of the lease.
+static char key[MQTT_KEY_SIZE]; ///< Key of the lease.
 
 static void pass(unsigned for_ms) {
     for (unsigned ms = 0; ms < for_ms; ms += PASS_MS) {
@@ -70,7 +70,7 @@ void setUp(void) {
     settings.drive.enabled = true;
     (void)snprintf(settings.gateway.socket, sizeof settings.gateway.socket, "/run/iwheel/gateway.sock");
     TEST_ASSERT_EQUAL_INT(0, mqtt_bridge_open(&bridge, &settings));
-    bridge.broker.try_us = UINT64_MAX; // Never: a connection is made in a thread, in real time.
+    bridge.broker.try_us = UINT64_MAX; // The bridge must not connect: a thread does that in real time.
     pass(500);
     command("arm", "");
     pass(200);
@@ -117,7 +117,7 @@ static void test_sender_that_stopped_drives_nothing_without_arm(void) {
     char fields[128];
     (void)snprintf(fields, sizeof fields, ",\"left_mm_s\":100,\"right_mm_s\":100,\"key\":\"%s\"", key);
     command("stop", "");
-    command("drive", fields); // Before the gateway could answer.
+    command("drive", fields); // This command comes before the gateway can reply.
     TEST_ASSERT_NULL(bridge_lease_key(&bridge.lease));
     pass(2000);
     TEST_ASSERT_TRUE(daemon_rig_is_told_zero());

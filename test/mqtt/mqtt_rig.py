@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Simulated wheels, gateway, MQTT bridge and broker in one private folder, and a client from outside that may send anything."""
+"""Simulated wheels, gateway, MQTT bridge and broker in one private folder, and an outside client that may send anything."""
 
 import contextlib
 import json
@@ -24,7 +24,7 @@ from bus import now_us
 from harness import WORDS, Process, Rig
 from trials import Skip, until
 
-# For any machine, however busy; as in the demonstration.
+# These limits fit any machine, however busy; the demonstration has the same.
 CONFIG = {"limits": {"wheel_silent_ms": 200, "echo_ms": 200}, "drive": {"lease_ms": 500, "max_speed_mm_s": 500}}
 ID = "w1"
 
@@ -36,7 +36,7 @@ def free_port():
 
 
 def put_table(page, maker, lines):
-    """Into the page, between the marks that name who makes it."""
+    """Writes a table into the page, between the marks that name the program."""
     text = page.read_text(encoding="utf-8")
     begin, end = f"<!-- figures: {maker} -->\n", "<!-- end of figures -->"
     before, rest = text.split(begin, 1)
@@ -44,7 +44,7 @@ def put_table(page, maker, lines):
 
 
 class Far:
-    """Somebody at the broker: keeps all that comes, and sends commands."""
+    """A client of the broker that stores all messages and sends commands."""
 
     def __init__(self, port, name="far", topics=("iwheel/#",), setup=None, host="127.0.0.1", clean=True):
         self.name, self.seq, self.all, self.lock = name, 0, [], threading.Lock()
@@ -57,12 +57,12 @@ class Far:
         self.client.on_connect = lambda client, *_: client.subscribe([(topic, 1) for topic in topics])
         self.client.on_subscribe = lambda *_: self.listens.set()
         self.client.on_disconnect = lambda *_: self.listens.clear()
-        self.client.on_message = self.take
+        self.client.on_message = self.receive
         self.client.connect_async(host, port)
         self.client.loop_start()
         assert self.listens.wait(5), f"{name} is at the broker"
 
-    def take(self, _client, _data, message):
+    def receive(self, _client, _data, message):
         with self.lock:
             self.all.append((message.topic, message.payload, message.retain, now_us()))
         if message.topic.endswith(f"/reply/{self.name}"):
@@ -75,21 +75,21 @@ class Far:
     def messages(self, what, machine=ID):
         return [json.loads(text) for text in self.texts(what, machine)]
 
-    def tell(self, fault, often=1, machine=ID):
-        """Each event of the bridge's has arrived, in order; and the row of it. What was sent, its numbers say."""
+    def print_figures(self, fault, often=1, machine=ID):
+        """Asserts that each event of the bridge has arrived, in order, and prints the row. The number of sent events follows from the events' numbers."""
         with self.lock:
-            told = [(json.loads(payload), at_us) for topic, payload, _, at_us in self.all if topic.startswith(f"iwheel/{machine}/event/")]
-        numbers = list(dict.fromkeys(int(event["id"].rsplit("-", 1)[1]) for event, _ in told))
+            events = [(json.loads(payload), at_us) for topic, payload, _, at_us in self.all if topic.startswith(f"iwheel/{machine}/event/")]
+        numbers = list(dict.fromkeys(int(event["id"].rsplit("-", 1)[1]) for event, _ in events))
         assert numbers == list(range(numbers[0], numbers[-1] + 1)), f"a gap, or out of order: {numbers}"
-        latest_s = max(at_us - event["t_us"] for event, at_us in told) / 1e6
-        row = f"{fault} | {often} | {numbers[-1] - numbers[0] + 1} | {len(numbers)} | {len(told) - len(numbers)} | {latest_s:.1f} s"
+        latest_s = max(at_us - event["t_us"] for event, at_us in events) / 1e6
+        row = f"{fault} | {often} | {numbers[-1] - numbers[0] + 1} | {len(numbers)} | {len(events) - len(numbers)} | {latest_s:.1f} s"
         print("figures:", row, flush=True)
         if "IWHEEL_FIGURES" in os.environ:  # See figures.py.
             with open(os.environ["IWHEEL_FIGURES"], "a", encoding="utf-8") as file:
                 file.write(f"figures: {row}\n")
 
     def events(self, name=None, machine=ID):
-        """(topic's name, event) in the order in which they came, doubles by id left out."""
+        """Events in the order of arrival, without doubles of the same id."""
         seen, found = set(), []
         with self.lock:
             all_of = list(self.all)
@@ -123,7 +123,7 @@ class Far:
                 return answer
 
     def ask(self, verb, quote=None, wait=True, **fields):
-        """A command as it should be; its answer."""
+        """Sends a correct command and returns its reply."""
         fields = {**(quote or self.quote()), **fields}
         self.seq += 1
         seq = self.seq
@@ -142,17 +142,17 @@ def shut(end):
 
 
 class Line(threading.Thread):
-    """A network between bridge and broker that can be cut: at any byte, or without a word."""
+    """A network between bridge and broker that can be cut: after any byte, or silently."""
 
-    CHUNK = 4096  # Bytes that are passed on together.
+    CHUNK = 4096  # Bytes that are transported together.
 
     def __init__(self, port):
         super().__init__(daemon=True)
         self.to, self.pairs, self.frozen = port, [], False
         self.listener = socket.create_server(("127.0.0.1", 0))
         self.port = self.listener.getsockname()[1]
-        self.left = None  # Bytes until it is cut; None: never.
-        self.delay = 0.0  # Of every 4 kB.
+        self.left = None  # Bytes until the line is cut; None: never.
+        self.delay = 0.0  # Delay of every 4 kB.
         self.start()
 
     def run(self):
@@ -182,7 +182,7 @@ class Line(threading.Thread):
         shut(other)
 
     def passed(self, data):
-        """(the part of it that goes on, whether the connection lasts)"""
+        """(the part that is transported, whether the connection stays)"""
         while self.frozen:
             time.sleep(0.01)
         time.sleep(self.delay)
@@ -253,7 +253,7 @@ class MqttRig(Rig):
         until(listens, what="the broker listens")
 
     def bring_broker_back(self, line, far):
-        """A broker that was killed knows no listeners: what the bridge told it before `far` is back would be told to nobody."""
+        """Starts the broker so that `far` connects before the bridge: a killed broker has no subscribers, and earlier messages would be lost."""
         line.left = 0
         self.start_broker()
         assert far.listens.wait(5), "far is back"
@@ -272,7 +272,7 @@ class MqttRig(Rig):
         return self.bridge
 
     def cut_here(self):
-        """Puts a line that can be cut before the broker, for the bridge."""
+        """Inserts a line that can be cut between the bridge and the broker."""
         line = Line(self.port)
         self.mqtt_settings["broker"]["port"] = line.port
         self.fars.append(line)

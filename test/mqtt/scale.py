@@ -1,16 +1,16 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""How many machines a broker and the console carry: iwheel-mqtt as it is, one process per machine, fed with what a gateway said.
+"""Measures how many machines a broker and the console can serve: unchanged iwheel-mqtt, one process per machine, with recorded lines of a gateway.
 
 usage: test/mqtt/scale.py [--build DIR] [--broker KIND]... [--machines N]... [--every MS]... [--seconds N] [--update]
 
-A gateway beside simulated wheels is driven and stopped by its button once a minute; its lines are kept, for watchers at 1 Hz and at 10 Hz.
-Then one process is the gateway of all N machines: each bridge connects to it, asks, and is told these lines at their times, each machine's
-shifted against the others'; where the recorded gateway was late with a state, the one before again. The console (iwheel-fleet) runs beside; how old each line is when it has dealt with it is noted in its
-process (stamps.c, preloaded). Brokers: mosquitto, nats (one nats-server with JetStream), nats3 (three, three replicas); all without TLS.
+A gateway with simulated wheels is driven and stopped by its button once a minute; its lines are recorded, for watchers at 1 Hz and at 10 Hz.
+Then one process is the gateway of all N machines: each bridge connects to it, sends its requests, and receives these lines at their times, each machine's
+shifted against the others'; if the recorded gateway was late with a state, the previous state again. The console (iwheel-fleet) runs in parallel; stamps.c (preloaded) records the age of each line after its
+processing. Brokers: mosquitto, nats (one nats-server with JetStream), nats3 (three, three replicas); all without TLS.
 
-Processor time is what the kernel counted for each process, so others on the machine change it little; latencies they do change.
---update puts the rows into docs/user/mqtt.md. What a run needs: some 2 MB of memory and 3 descriptors per machine.
+Processor time is the kernel's count for each process, so other programs change it little; they do change latencies.
+--update writes the rows into docs/user/mqtt.md. A run needs about 2 MB of memory and 3 descriptors per machine.
 """
 
 import argparse
@@ -45,7 +45,7 @@ from mqtt_rig import MqttRig, free_port, put_table
 from trials import ROOT, Skip, until
 
 PAGE = ROOT / "docs/user/mqtt.md"
-STAMP = struct.Struct("=QQIIII")  # As stamps.c writes it.
+STAMP = struct.Struct("=QQIIII")  # The format of stamps.c.
 HEAD = [
     "broker",
     "machines",
@@ -65,14 +65,14 @@ HEAD = [
     "doubled",
 ]
 MINUTE_S = 60
-BATCH = 25  # Bridges that start at once: a gateway is there within 0.2 s for each.
+BATCH = 25  # Bridges that start together: each finds a gateway within 0.2 s.
 
 
-# ---- what a gateway said ----------------------------------------------------------------------------------------------
+# ---- the lines of a gateway -------------------------------------------------------------------------------------------
 
 
 class Tape:
-    """A gateway's lines in slots of a watcher's period, each split around its time, and its answers."""
+    """A gateway's lines in slots of a watcher's period, each split around its time, and its replies."""
 
     def __init__(self, rig, seconds):
         self.seconds, self.slots, self.answers = seconds, {}, {}
@@ -115,7 +115,7 @@ class Tape:
 
     @staticmethod
     def fill(slots):
-        """Where a gateway that was woken late said nothing, what it had said before: each slot has a state."""
+        """Repeats the previous state in slots without one, where the gateway was woken late: each slot has a state."""
         last = next(line for slot in slots for line in slot if b'"event":"state"' in line[0])
         for slot in slots:
             states = [line for line in slot if b'"event":"state"' in line[0]]
@@ -124,7 +124,7 @@ class Tape:
                 slot.append(last)
 
     def act(self, rig):
-        """Most of a short tape is this; of a minute, the first seconds."""
+        """Drives and stops: most of a short tape, or the first seconds of a minute."""
         client = rig.client(name="walker")
         time.sleep(0.5)
         until(lambda: client.request("arm", name="walker")["ok"], what="armed")
@@ -134,16 +134,16 @@ class Tape:
         rig.press()
         time.sleep(0.6)
         rig.press(False)
-        until(lambda: client.request("reset")["ok"], what="the latch is loose")
+        until(lambda: client.request("reset")["ok"], what="the latch is reset")
         client.close()
 
 
 class Gateway:
-    """In a process of its own: the gateway of all machines, on one socket."""
+    """A separate process that acts as the gateway of all machines, on one socket."""
 
     def __init__(self, path, tape, machines, rate_hz):
         self.path, self.tape, self.machines, self.rate_hz = path, tape, machines, rate_hz
-        self.count = multiprocessing.Array("Q", 4)  # Connections, lines, stops, lines that a bridge did not take.
+        self.count = multiprocessing.Array("Q", 4)  # Connections, lines, stops, lines that a bridge did not accept.
         self.go, self.end = multiprocessing.Event(), multiprocessing.Event()
         self.process = multiprocessing.get_context("fork").Process(target=self.run, daemon=True)
         self.process.start()
@@ -162,28 +162,28 @@ class Gateway:
                     link.setblocking(False)
                     links[link.fileno()] = link
                     poll.register(link, select.EPOLLIN)
-                    self.say(link, self.tape.hello)
+                    self.send(link, self.tape.hello)
                 elif not self.answer(links[fd], listening):
                     poll.unregister(fd)
                     link = links.pop(fd)
                     link.close()
-                    if link in listening:  # A bridge that was not answered in time comes again.
+                    if link in listening:  # A bridge without a reply in time connects again.
                         listening.remove(link)
                 self.count[0] = len(listening)
             if begun is None and self.go.is_set():
                 begun = time.monotonic()
-            # Machine `turn % machines` is told its slot `turn / machines`.
+            # Machine `turn % machines` receives its slot `turn / machines`.
             due = int((time.monotonic() - begun) * self.machines * self.rate_hz) if begun else 0
             while turn < due:
                 turn += 1
                 machine = turn % self.machines
                 if machine < len(listening):
-                    self.tell(listening[machine], turn // self.machines + 7 * machine)
+                    self.send_slot(listening[machine], turn // self.machines + 7 * machine)
 
-    def say(self, link, line):
+    def send(self, link, line):
         try:
             return link.send(line) == len(line)
-        except OSError:  # As the gateway: who reads slowly loses.
+        except OSError:  # As in the gateway, a slow reader loses lines.
             return False
 
     def answer(self, link, listening):
@@ -199,17 +199,17 @@ class Gateway:
                 listening.append(link)
             else:
                 reply = self.tape.answers[asked["cmd"]] % asked["id"]
-            self.say(link, reply.encode() + b"\n")
+            self.send(link, reply.encode() + b"\n")
         return bool(data)
 
-    def tell(self, link, slot):
+    def send_slot(self, link, slot):
         slots = self.tape.slots[self.rate_hz]
         for head, tail in slots[slot % len(slots)]:
             line = head + str(now_us()).encode() + tail
-            taken = self.say(link, line)
-            self.count[1] += taken
-            self.count[2] += taken and b'"event":"stop"' in line
-            self.count[3] += not taken
+            accepted = self.send(link, line)
+            self.count[1] += accepted
+            self.count[2] += accepted and b'"event":"stop"' in line
+            self.count[3] += not accepted
 
 
 # ---- brokers ------------------------------------------------------------------------------------------------------------
@@ -222,7 +222,7 @@ def mosquitto_files(folder, port):
 
 
 def nats_files(folder, port, servers):
-    """One server, or three with their routes; as share/fleet/nats-server.conf, without TLS and rights."""
+    """One server, or three with their routes; configured like share/fleet/nats-server.conf, without TLS and rights."""
     routes, made = free_port(), []
     for number in range(1, servers + 1):
         host, config = f"127.0.0.{number}", Path(folder, f"nats{number}.conf")
@@ -244,7 +244,7 @@ BROKERS = {"mosquitto": mosquitto_files, "nats": lambda folder, port: nats_files
 
 
 def cpu_s(pid):
-    """What the kernel has counted for all threads of a process, those that ended included."""
+    """The kernel's count for all threads of a process, including those that have ended."""
     return time.clock_gettime((~pid << 3) | 2)
 
 
@@ -253,7 +253,7 @@ def memory_kB(pid, what="Rss"):
 
 
 class Load:
-    """Broker, console, machines. `measure` is a row of the table."""
+    """Broker, console and machines. `measure` returns a row of the table."""
 
     def __init__(self, build, tape, kind, machines, every_ms):
         if not shutil.which("mosquitto" if kind == "mosquitto" else "nats-server"):
@@ -279,7 +279,7 @@ class Load:
         self.brokers = [self.spawn(f"broker{number}", command) for number, (_, command) in enumerate(made)]
         for host in self.hosts:
             until(lambda host=host: socket.socket().connect_ex((host, self.port)) == 0, 30, f"the broker at {host}")
-        time.sleep(3 if len(self.hosts) > 1 else 0)  # Until they have elected.
+        time.sleep(3 if len(self.hosts) > 1 else 0)  # The servers need this time to elect a leader.
         self.gateway = Gateway(f"{self.folder}/gateway.sock", self.tape, self.machines, self.rate_hz)
         self.console = self.start_console()
         until(lambda: self.connected() == 1, 60, "the console is at the broker")
@@ -316,7 +316,7 @@ class Load:
         return self.spawn(spool.name, [find_program(self.build, "iwheel-mqtt"), "-c", str(config)])
 
     def connected(self):
-        """Connections that a broker has taken."""
+        """Connections that the broker has accepted."""
         lines = [line.split() for line in Path("/proc/net/tcp").read_text(encoding="ascii").splitlines()[1:]]
         return sum(line[1].endswith(f":{self.port:04X}") and line[3] == "01" for line in lines)
 
@@ -338,11 +338,11 @@ class Load:
         self.console.wait(20)
         stamps = list(STAMP.iter_unpack(Path(self.folder, "stamps").read_bytes()))
         cpu = [(now - then) * 1e6 / (end_us - begin_us) * 1000 for now, then in zip(after, before, strict=False)]
-        self.not_taken = self.gateway.count[3]
+        self.not_accepted = self.gateway.count[3]
         return self.judge(stamps, begin_us, end_us, cpu, memory)
 
     def drain(self):
-        """Until broker and console have nothing to do any more; half a minute at most."""
+        """Waits until broker and console are idle, for at most half a minute."""
         for _ in range(15):
             before = self.times()
             time.sleep(2)
@@ -356,9 +356,9 @@ class Load:
         for at_us, boot, late_us, number, _, _ in inside:
             if number == 0:
                 states.setdefault(boot, []).append(at_us - late_us)
-        for told in states.values():
-            told.sort()
-            missing += sum(max(0, round((later - before) / 1000 / self.every_ms) - 1) for before, later in itertools.pairwise(told))
+        for times in states.values():
+            times.sort()
+            missing += sum(max(0, round((later - before) / 1000 / self.every_ms) - 1) for before, later in itertools.pairwise(times))
         stops = [(boot, number) for _, boot, _, number, _, _ in stamps if number]
         self.row = {
             "kind": self.kind,
@@ -421,7 +421,7 @@ def run_load(rig, seconds, **load):
 
 
 def update(rows):
-    """Rows of the same broker, number and period take the place of those that are there."""
+    """Rows of the same broker, number and period replace the existing ones."""
     begin = "<!-- figures: test/mqtt/scale.py --update -->"
     section = PAGE.read_text(encoding="utf-8").split(begin, 1)[1].split("<!-- end", 1)[0]
     old = [[cell.strip() for cell in line.strip("|").split("|")] for line in section.splitlines() if line.startswith("| ")][2:]
@@ -459,8 +459,8 @@ def main():
                     load.close()
                 print(", ".join(f"{name} {cell}" for name, cell in zip(HEAD, rows[-1], strict=False)))
                 print(
-                    f"        a bridge: {load.bridge_kB[0] / 1000:.1f} MB, of which its own and its share of what is shared {load.bridge_kB[1] / 1000:.1f} MB; "
-                    f"{load.not_taken} lines not taken",
+                    f"        a bridge: {load.bridge_kB[0] / 1000:.1f} MB, of which private and share of shared memory {load.bridge_kB[1] / 1000:.1f} MB; "
+                    f"{load.not_accepted} lines not accepted",
                     flush=True,
                 )
                 if options.update:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Preloaded into iwheel-fleet by scale.py: notes how old each message of a machine is when the console has dealt with it. The gateway's line
-// carries `t_us` of this machine's monotonic clock, so it is the whole way: line, bridge, broker, console.
+// Preloaded into iwheel-fleet by scale.py: records the age of each message of a machine after the console has processed it. The gateway's line
+// contains `t_us` of this machine's monotonic clock, so the age covers the whole way: line, bridge, broker, console.
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <mosquitto.h>
@@ -12,23 +12,23 @@
 
 typedef struct {
     uint64_t at_us;
-    uint64_t boot; ///< Of the bridge: which machine it is.
+    uint64_t boot; ///< Boot of the bridge, which identifies the machine.
     uint32_t late_us;
-    uint32_t number; ///< In the event's id; 0: a state.
-    uint32_t bytes;  ///< Topic and payload.
+    uint32_t number; ///< Number in the event's id; 0: a state.
+    uint32_t bytes;  ///< Bytes of topic and payload.
     uint32_t spare;
 } stamp_t;
 
 typedef void (*callback_t)(struct mosquitto *, void *, const struct mosquitto_message *);
 typedef void (*callback5_t)(struct mosquitto *, void *, const struct mosquitto_message *, const mosquitto_property *);
 
-static callback_t taken;
+static callback_t console_callback;
 static callback5_t taken5;
 static FILE *file;
 
 static uint64_t number_behind(const struct mosquitto_message *message, const char *name, int base) {
     const char *at = memmem(message->payload, (size_t)message->payloadlen, name, strlen(name));
-    return (at != NULL) ? strtoull(at + strlen(name), NULL, base) : 0U; // JSON: something that is no digit follows.
+    return (at != NULL) ? strtoull(at + strlen(name), NULL, base) : 0U; // In JSON a character that is no digit follows.
 }
 
 static void note(const struct mosquitto_message *message) {
@@ -51,8 +51,8 @@ static void note(const struct mosquitto_message *message) {
     (void)fwrite(&stamp, sizeof stamp, 1, file);
 }
 
-static void take(struct mosquitto *client, void *context, const struct mosquitto_message *message) {
-    taken(client, context, message);
+static void on_message(struct mosquitto *client, void *context, const struct mosquitto_message *message) {
+    console_callback(client, context, message);
     note(message);
 }
 
@@ -64,8 +64,8 @@ static void take5(struct mosquitto *client, void *context, const struct mosquitt
 
 void mosquitto_message_callback_set(struct mosquitto *client, callback_t callback) {
     void (*set)(struct mosquitto *, callback_t) = (void (*)(struct mosquitto *, callback_t))dlsym(RTLD_NEXT, __func__);
-    taken = callback;
-    set(client, take);
+    console_callback = callback;
+    set(client, on_message);
 }
 
 void mosquitto_message_v5_callback_set(struct mosquitto *client, callback5_t callback) {

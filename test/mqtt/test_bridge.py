@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the bridge tells, carries out, drops, keeps and drives. The judge is the gateway's own word, the bus log, and who listens at the broker."""
+"""What the bridge publishes, carries out, drops, stores and drives. The judges are the gateway's replies, the bus log, and a client of the broker."""
 
 import json
 import os
@@ -43,26 +43,26 @@ def numbers(far):
 
 
 def make_stops(rig, count):
-    """So many stops, each latched by the button and reset again; the last one's number."""
+    """Makes this many stops, each latched by the button and reset again; returns the number of the last."""
     client = rig.client(name="stopper")
     number = client.request("why")["number"]
     for _ in range(count):
         rig.press()
-        number = until(lambda before=number: (told := client.request("why")["number"]) > before and told, what="a stop")
+        number = until(lambda before=number: (reply := client.request("why")["number"]) > before and reply, what="a stop")
         rig.press(False)
-        until(lambda: client.request("reset")["ok"], what="the latch is loose")
+        until(lambda: client.request("reset")["ok"], what="the latch is reset")
     client.close()
     return number
 
 
 def arm(far):
-    """The key that drives; a busy machine may want a second try."""
-    far.key = until(lambda: (told := far.ask("arm"))["ok"] and told, what="armed")["key"]
+    """Arms and stores the key; a busy machine may need a second try."""
+    far.key = until(lambda: (reply := far.ask("arm"))["ok"] and reply, what="armed")["key"]
     return far.key
 
 
 def steer(far, seconds, speed=200, until_time=None):
-    """Drives by quoting the newest state, as a page would; how many commands were sent."""
+    """Drives with quotes of the newest state, like a page; returns the number of sent commands."""
     until(lambda: far.messages("state"), what="a state")
     end, sent = until_time or time.monotonic() + seconds, 0
     while time.monotonic() < end:
@@ -73,10 +73,10 @@ def steer(far, seconds, speed=200, until_time=None):
     return sent
 
 
-# ---- what it tells --------------------------------------------------------------------------------------------------
+# ---- what it publishes ----------------------------------------------------------------------------------------------
 
 
-def test_topics_are_those_of_the_page_and_say_what_the_gateway_says(rig):
+def test_topics_match_the_page_and_values_match_the_gateway(rig):
     rig.start()
     far = rig.online()
     state = until(lambda: far.messages("state"), what="a state")[-1]
@@ -86,7 +86,7 @@ def test_topics_are_those_of_the_page_and_say_what_the_gateway_says(rig):
     assert info["machine"] == ID and info["gateway"] == "connected" and info["may_drive"] is False and info["budget"] == snapshot["budget"], info
     assert info["boot"] == state["boot"] and len(info["boot"]) == 16
     make_stops(rig, 1)
-    stop = until(lambda: far.events("stop"), what="the stop is told")[0]
+    stop = until(lambda: far.events("stop"), what="the stop is published")[0]
     why = rig.client(name="asker").request("why")
     assert all(stop[key] == why[key] for key in ("number", "cause", "latched", "wall_us", "at_us")), (stop, why)
     assert until(lambda: far.events("fault"), what="a fault")[0]["cause"] == "estop_line" and far.events("estop")
@@ -95,11 +95,11 @@ def test_topics_are_those_of_the_page_and_say_what_the_gateway_says(rig):
     assert not late.events() and all(retained == (topic.split("/")[2] in ("availability", "info")) for topic, _, retained, _ in late.all[:2])
     rig.bridge.signal(signal.SIGTERM)
     assert rig.bridge.wait(3) == 0
-    until(lambda: far.texts("availability")[-1] == "offline", what="a clean end is told")
+    until(lambda: far.texts("availability")[-1] == "offline", what="a clean end is published")
 
 
 @pytest.mark.rig(settings={"state": {"every_ms": 60000}})
-def test_state_comes_at_once_when_it_changes_and_else_as_seldom_as_configured(rig):
+def test_state_is_sent_on_change_else_at_configured_interval(rig):
     rig.start()
     far = rig.online()
     time.sleep(1.5)
@@ -111,7 +111,7 @@ def test_state_comes_at_once_when_it_changes_and_else_as_seldom_as_configured(ri
     assert time.monotonic() - begun < 1.5
 
 
-def test_gateway_gone_is_offline_bridge_killed_is_offline_by_its_will(rig):
+def test_gateway_gone_or_bridge_killed_is_published_offline(rig):
     rig.start()
     far = rig.online()
     rig.gateway.signal(signal.SIGKILL)
@@ -135,11 +135,11 @@ def test_bridge_before_gateway_and_broker_waits_for_both(rig):
 
 
 @pytest.mark.rig(settings={"home_assistant": {"enabled": "yes"}})
-def test_home_assistant_is_told_sensors_that_are_in_the_state(rig):
+def test_home_assistant_gets_sensors_that_are_in_the_state(rig):
     rig.start()
     ha = rig.far("ha", topics=("homeassistant/#", "iwheel/#"))
     rig.online(ha)
-    told = until(
+    reply = until(
         lambda: (
             len([1 for topic, *_ in ha.all if topic.startswith("homeassistant/")]) == 10
             and [(topic, json.loads(payload), retain) for topic, payload, retain, _ in ha.all if topic.startswith("homeassistant/")]
@@ -147,7 +147,7 @@ def test_home_assistant_is_told_sensors_that_are_in_the_state(rig):
         what="ten sensors",
     )
     state = until(lambda: ha.messages("state"), what="a state")[-1]
-    for topic, config, _ in told:
+    for topic, config, _ in reply:
         assert topic.startswith(("homeassistant/sensor/iwheel_w1/", "homeassistant/binary_sensor/iwheel_w1/")) and topic.endswith("/config"), topic
         assert (
             config["state_topic"] == f"iwheel/{ID}/state"
@@ -160,12 +160,12 @@ def test_home_assistant_is_told_sensors_that_are_in_the_state(rig):
             value = value[part]
         assert config["origin"]["name"] == "iwheel-mqtt" and config["origin"]["sw_version"], config
         measured = config.get("unit_of_measurement") is not None
-        assert (config.get("state_class") in ("measurement", "total")) == measured, f"a number has statistics, a word has none: {config}"
-    assert len({config["unique_id"] for _, config, _ in told}) == 10
-    (template,) = [config["value_template"] for topic, config, _ in told if topic.endswith("/estop/config")]
+        assert (config.get("state_class") in ("measurement", "total")) == measured, f"a number has statistics, a text has none: {config}"
+    assert len({config["unique_id"] for _, config, _ in reply}) == 10
+    (template,) = [config["value_template"] for topic, config, _ in reply if topic.endswith("/estop/config")]
     jinja = pytest.importorskip("jinja2").Template(template)
     for line, shown in (("released", "OFF"), ("pressed", "ON"), ("unreadable", "ON"), ("disagrees", "ON"), ("none", "None")):
-        assert jinja.render(value_json={"estop": {"state": line}}) == shown, f"{line}: Home Assistant takes None for unknown"
+        assert jinja.render(value_json={"estop": {"state": line}}) == shown, f"{line}: Home Assistant shows None as unknown"
     assert rig.far("later", topics=("homeassistant/#",)) and until(
         lambda: len(rig.fars[-1].all) == 10 and all(retain for _, _, retain, _ in rig.fars[-1].all), what="retained"
     )
@@ -183,9 +183,9 @@ def test_stop_and_estop_that_are_fresh_stop_the_wheels(rig):
     assert answer["ok"] and answer["state"] in ("stopping", "listening"), answer
     assert braking_ms(rig, asked_us) < 500
     driver.end()
-    assert far.ask("estop", reason="somebody in the way")["state"] == "latched"
+    assert far.ask("estop", reason="a person in the way")["state"] == "latched"
     why = rig.client(name="asker").request("why")
-    assert why["cause"] == "estop_software" and "somebody in the way" in why["sentence"]
+    assert why["cause"] == "estop_software" and "a person in the way" in why["sentence"]
 
 
 def test_command_late_early_or_of_another_boot_stops_nothing(rig):
@@ -285,11 +285,11 @@ def test_recording_is_fetched_in_pieces_with_checksum(rig):
     far = rig.online()
     make_stops(rig, 1)
     name = until(lambda: far.ask("recordings")["recordings"], what="a recording")[0]["name"] + ".conf"
-    piece = until(lambda: (told := far.ask("recording", name=name, offset=0))["ok"] and told, what="its first piece")
+    piece = until(lambda: (reply := far.ask("recording", name=name, offset=0))["ok"] and reply, what="its first piece")
     assert piece["size"] > 0 and piece["file_crc32"] is not None and far.ask("recording", name="../x.conf")["error"] == "bad_value"
 
 
-def test_gateway_that_hangs_stop_is_told_as_not_delivered(rig):
+def test_gateway_that_hangs_stop_is_reported_not_delivered(rig):
     rig.start()
     far = rig.online()
     quote = far.quote()
@@ -346,8 +346,8 @@ def test_sender_drives_while_it_sends_and_no_longer(rig):
 
 
 @pytest.mark.rig(**DRIVING)
-def test_broker_stalls_300_ms_the_wheels_stop_and_nothing_is_driven_late(rig):
-    """From the bus log: lease and period after the last command the wheels are told to brake, and the backlog moves nothing."""
+def test_broker_stalls_300_ms_wheels_stop_without_late_drive(rig):
+    """From the bus log: lease and period after the last command the wheels brake, and the backlog moves nothing."""
     rig.start()
     far = rig.online()
     arm(far)
@@ -364,7 +364,7 @@ def test_broker_stalls_300_ms_the_wheels_stop_and_nothing_is_driven_late(rig):
     speeds = [abs(speed) for t_us, _, speed in rig.bus.setpoints(stalled_us) if t_us > back_us]
     hold(all(later <= before + 1 for before, later in zip(speeds, speeds[2:], strict=False)), f"faster again: {speeds[:40]}")
     assert rig.gateway_state()["state"] == "listening"
-    stop = until(lambda: far.events("stop"), what="the stop is told")[-1]
+    stop = until(lambda: far.events("stop"), what="the stop is published")[-1]
     assert stop["cause"] in ("lease_lost", "client_stop"), stop
 
 
@@ -405,7 +405,7 @@ def test_driving_by_the_watch_socket_ends_with_the_missing_right(rig):
 
 
 def settle(far):
-    """Until nothing waits in the spool: what was told last has arrived, too."""
+    """Waits until the spool is empty, so the last event has arrived too."""
     until(lambda: far.messages("info")[-1]["events"]["waiting"] == 0, 20, "the spool is empty")
 
 
@@ -422,11 +422,11 @@ def test_broker_killed_and_back_each_stop_once_in_order(rig):
     faults = [(event["cause"], event["present"]) for event in far.events("fault") if event["cause"] == "estop_line"]
     assert faults == [("estop_line", True), ("estop_line", False)] * last, faults
     settle(far)
-    far.tell("broker killed, back later")
+    far.print_figures("broker killed, back later")
 
 
 def test_network_cut_at_any_byte_each_stop_once_in_order(rig):
-    """A confirmation that is lost on its way makes a double, which its id tells; nothing makes a gap."""
+    """A lost confirmation makes a double, which has the same id; nothing makes a gap."""
     line = rig.cut_here()
     rig.start()
     far = rig.online()
@@ -438,12 +438,12 @@ def test_network_cut_at_any_byte_each_stop_once_in_order(rig):
     line.left = None
     until(lambda: numbers(far) == list(range(1, last + 1)), 40, "all six")
     settle(far)
-    far.tell("connection cut behind a byte, also in the middle of a confirmation", 6)
+    far.print_figures("connection cut behind a byte, also in the middle of a confirmation", 6)
 
 
 @pytest.mark.full
 @pytest.mark.rig(settings={"broker": {"keepalive_s": 5}})
-def test_network_that_swallows_everything_is_noticed_and_each_stop_told(rig):
+def test_network_that_drops_all_is_noticed_and_no_stop_is_lost(rig):
     line = rig.cut_here()
     rig.start()
     far = rig.online()
@@ -453,10 +453,10 @@ def test_network_that_swallows_everything_is_noticed_and_each_stop_told(rig):
     line.frozen = False
     until(lambda: numbers(far) == list(range(1, last + 1)), 40, "all three")
     settle(far)
-    far.tell("network that swallows everything, noticed after 1.5 times `keepalive_s` (`--full`)")
+    far.print_figures("network that swallows everything, noticed after 1.5 times `keepalive_s` (`--full`)")
 
 
-def test_bridge_killed_while_it_keeps_events_each_stop_once_in_order(rig):
+def test_bridge_killed_with_stored_events_each_stop_comes_once(rig):
     line = rig.cut_here()
     rig.start_gateway()
     rig.start_broker()
@@ -465,12 +465,12 @@ def test_bridge_killed_while_it_keeps_events_each_stop_once_in_order(rig):
     for _ in range(4):
         rig.start_bridge()
         until(lambda: "connected to the gateway" in rig.bridge.text(), what="the bridge listens")
-        heard = make_stops(rig, 2)
-        until(lambda number=heard: f'"number":{number},'.encode() in Path(rig.path("spool/events")).read_bytes(), what="heard")
+        stored = make_stops(rig, 2)
+        until(lambda number=stored: f'"number":{number},'.encode() in Path(rig.path("spool/events")).read_bytes(), what="stored")
         rig.bridge.signal(signal.SIGKILL)
         rig.bridge.wait(3)
         os.unlink(rig.path("mqtt.out"))
-    unseen = make_stops(rig, 1)  # Nobody was there: told by `why` afterwards.
+    unseen = make_stops(rig, 1)  # The bridge is down; it learns of the stop from `why` later.
     rig.start_bridge()
     rig.bring_broker_back(line, far)
     until(lambda: numbers(far) == list(range(1, unseen + 1)), 20, f"all {unseen}")
@@ -480,11 +480,11 @@ def test_bridge_killed_while_it_keeps_events_each_stop_once_in_order(rig):
     rig.start_bridge()
     rig.online(far)
     time.sleep(0.5)
-    assert numbers(far) == list(range(1, unseen + 1)), "a new start tells no stop again"
-    far.tell("bridge killed while events wait", 4)
+    assert numbers(far) == list(range(1, unseen + 1)), "a new start publishes no stop again"
+    far.print_figures("bridge killed while events wait", 4)
 
 
-def test_disk_full_events_wait_in_memory_and_it_is_said(rig):
+def test_disk_full_events_wait_in_memory_and_are_reported(rig):
     def small_files():
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
         resource.setrlimit(resource.RLIMIT_FSIZE, (2000, resource.RLIM_INFINITY))
@@ -497,12 +497,12 @@ def test_disk_full_events_wait_in_memory_and_it_is_said(rig):
     rig.start_bridge(small_files, stdout=subprocess.DEVNULL)
     time.sleep(0.4)
     last = make_stops(rig, 5)
-    until(lambda: "accepts no data" in rig.bridge.text(), what="said in the log")
+    until(lambda: "accepts no data" in rig.bridge.text(), what="reported in the log")
     rig.bring_broker_back(line, far)
     until(lambda: numbers(far) == list(range(1, last + 1)), 20, f"all {last}")
     until(lambda: "on its disk again" in rig.bridge.text(), what="the disk is used again")
     settle(far)
-    far.tell("disk full at 2 kB: events kept in memory, `on_disk` and the log say so")
+    far.print_figures("disk full at 2 kB: events kept in memory, `on_disk` and the log say so")
 
 
 def test_clock_that_steps_changes_neither_ages_nor_order(rig):
@@ -511,7 +511,7 @@ def test_clock_that_steps_changes_neither_ages_nor_order(rig):
     subprocess.run(["cc", "-shared", "-fPIC", "-o", library, source, "-ldl"], check=True)
     preload = library
     if "asan" in subprocess.run(["ldd", rig.program("iwheel-mqtt")], capture_output=True, text=True, check=True).stdout:
-        raise Skip("the sanitizer wants to be loaded first")
+        raise Skip("the sanitizer must be loaded first")
     rig.start_gateway()
     rig.start_broker()
     rig.start_bridge(env={**os.environ, "LD_PRELOAD": preload})
@@ -520,7 +520,7 @@ def test_clock_that_steps_changes_neither_ages_nor_order(rig):
     make_stops(rig, 2)
     until(lambda: numbers(far) == [1, 2], what="both")
     settle(far)
-    far.tell("wall clock that jumps by two years and back at each look")
+    far.print_figures("wall clock that jumps by two years and back at each look")
     clocks = [event["heard_wall_us"] for event in far.events()]
     assert max(clocks) - min(clocks) > 86400_000_000, "the clock did step"
 
@@ -545,14 +545,14 @@ def test_campaign_of_kills_each_stop_once_in_order(rig):
             rig.start_bridge()
     until(lambda: numbers(far) == list(range(1, last + 1)), 60, f"all {last}")
     settle(far)
-    far.tell("bridge and broker killed in turn (`--full`)", 50)
+    far.print_figures("bridge and broker killed in turn (`--full`)", 50)
 
 
-# ---- who is let in --------------------------------------------------------------------------------------------------
+# ---- access ---------------------------------------------------------------------------------------------------------
 
 
 def make_certificates(rig):
-    """A signer, another one, and certificates of a broker and of the machine."""
+    """Two signers, and certificates of a broker and of the machine."""
 
     def openssl(*words):
         done = subprocess.run(["openssl", *words], cwd=rig.folder, capture_output=True, text=True, check=False)
@@ -611,7 +611,7 @@ def make_certificates(rig):
         )
 
 
-def test_tls_needs_the_signer_the_name_and_the_machines_certificate(rig):
+def test_tls_needs_signer_name_and_certificate_of_machine(rig):
     make_certificates(rig)
     rig.broker_lines += [f"cafile {rig.path('ca.pem')}", f"certfile {rig.path('broker.pem')}", f"keyfile {rig.path('broker.key')}", "require_certificate true"]
     rig.mqtt_settings["broker"].update({"host": "localhost", "ca": rig.path("ca.pem"), "certificate": rig.path("machine.pem"), "key": rig.path("machine.key")})
@@ -621,7 +621,7 @@ def test_tls_needs_the_signer_the_name_and_the_machines_certificate(rig):
         right = dict(rig.mqtt_settings["broker"])
         rig.mqtt_settings["broker"].update(wrong)
         bridge = rig.start_bridge()
-        until(lambda: bridge.text().count("no broker"), 5, f"said: {bridge.text()}")
+        until(lambda: bridge.text().count("no broker"), 5, f"reported: {bridge.text()}")
         time.sleep(0.3)
         assert "connected to the broker" not in bridge.text(), (wrong, bridge.text())
         bridge.end()
@@ -633,7 +633,7 @@ def test_tls_needs_the_signer_the_name_and_the_machines_certificate(rig):
     rig.online(far)
 
 
-def test_credentials_that_others_may_read_are_refused_and_right_ones_needed(rig):
+def test_credentials_wrong_or_readable_by_others_are_refused(rig):
     secret = Path(rig.path("secret"))
     subprocess.run(["mosquitto_passwd", "-b", "-c", rig.path("passwords"), ID, "pass:word"], check=True)
     os.chmod(rig.path("passwords"), 0o644)
@@ -655,7 +655,7 @@ def test_credentials_that_others_may_read_are_refused_and_right_ones_needed(rig)
         bridge.end()
 
 
-def test_another_bridge_with_the_same_directory_is_kept_out(rig):
+def test_second_bridge_with_the_same_directory_is_refused(rig):
     rig.start()
     rig.online()
     first = rig.bridge
@@ -681,7 +681,7 @@ def test_check_refuses_a_spool_file_that_the_start_refuses(rig):
     assert check_of(rig)[0] == 0
 
 
-def test_check_of_a_spool_for_reading_only_warns_and_the_bridge_starts(rig):
+def test_check_of_read_only_spool_warns_and_bridge_starts(rig):
     if os.geteuid() != 0:
         raise Skip("needs root to mount")
     mount = read_only(rig.path("spool"))
@@ -691,7 +691,7 @@ def test_check_of_a_spool_for_reading_only_warns_and_the_bridge_starts(rig):
     assert code == 0 and "warning" in words and "Read-only file system" in words, words
 
 
-def test_check_looks_at_everything_and_leaves_nothing_behind(rig):
+def test_check_judges_everything_and_leaves_no_file(rig):
     rig.start_bridge().end()
     for name in os.listdir(rig.path("spool")):
         os.unlink(os.path.join(rig.path("spool"), name))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The console: history from the cluster's stream, recordings fetched from a machine whatever becomes of the line, and MQTT 5."""
+"""The console: history from the cluster's stream, recordings fetched from a machine over a disturbed line, and MQTT 5."""
 
 import pytest
 import base64
@@ -26,7 +26,7 @@ try:
     from paho.mqtt.packettypes import PacketTypes
     from paho.mqtt.properties import Properties
 except ImportError:
-    pass  # The rig skips.
+    pass  # The rig then skips the test.
 
 FILES = (".conf", ".jsonl", ".log")
 
@@ -64,7 +64,7 @@ def cluster_config(rig, cluster, host="", name="console", **keys):
 
 
 def machine_at(rig, cluster, name="w2"):
-    """A machine of the fleet that publishes what the test wants it to."""
+    """A machine of the fleet that publishes what the test requests."""
     until(lambda: socket.socket().connect_ex((HOSTS[1], cluster.mqtt)) == 0, 10, "the server listens")
     far = Far(cluster.mqtt, name, topics=(f"iwheel/{name}/cmd/+",), setup=with_certificate(rig, name), host=HOSTS[1])
     rig.fars.append(far)
@@ -72,7 +72,7 @@ def machine_at(rig, cluster, name="w2"):
 
 
 def publish_stops(far, events, pad=0, qos=1):
-    """(boot, number of the event, number of the stop, when it was heard, in s from now)"""
+    """(boot, number of the event, number of the stop, time of the stop in s from now)"""
     sent = []
     for boot, number, stop, when_s in events:
         event = {
@@ -83,7 +83,7 @@ def publish_stops(far, events, pad=0, qos=1):
             "number": stop,
             "cause": "wheel_lost",
             "wall_us": int((time.time() + when_s) * 1e6),
-            "sentence": f"left wheel silent, told as {stop}" + "." * pad,
+            "sentence": f"left wheel offline, reported as {stop}" + "." * pad,
         }
         sent.append(far.client.publish(f"iwheel/{far.name}/event/stop", json.dumps(event), qos=qos))
     for one in sent:
@@ -91,7 +91,7 @@ def publish_stops(far, events, pad=0, qos=1):
     assert all(one.is_published() for one in sent)
 
 
-def test_history_tells_each_stop_once_with_gaps_and_survives_the_leader(rig):
+def test_history_after_lost_leader_has_each_stop_once_and_gaps(rig):
     cluster = Cluster(rig)
     config = cluster_config(rig, cluster)
     code, out, err = console(rig, config, "history")
@@ -108,7 +108,7 @@ def test_history_tells_each_stop_once_with_gaps_and_survives_the_leader(rig):
     code, out, err = console(rig, config, "history", "w2", "--last", "1h")
     assert code == 0 and "2 duplicates left out" in out and "(stored " in out and ID not in out.split(), (code, out, err)
     assert re.search(
-        r"-- 2 events before this one are not in the stream.*\n.*told as 3\n.*-- 2 stops before this one are not in the stream.*\n.*told as 6\n", out
+        r"-- 2 events before this one are not in the stream.*\n.*reported as 3\n.*-- 2 stops before this one are not in the stream.*\n.*reported as 6\n", out
     ), out
     print("        " + out.replace("\n", "\n        "), flush=True)
     *events, total = lines(console(rig, config, "history", "--json", "--last", "1h")[1])
@@ -116,9 +116,9 @@ def test_history_tells_each_stop_once_with_gaps_and_survives_the_leader(rig):
     assert total["events"] == 6 and total["machines"] == 2 and total["doubled"] == 2 and total["missing"] == 2 and total["stops_missing"] == 2, total
     before = datetime.fromtimestamp(time.time() - 8000, timezone.utc).strftime("%Y-%m-%dT%H:%MZ")
     code, out, err = console(rig, config, "history", "w2", "--since", "2020-01-01", "--until", before)
-    assert code == 0 and out.count(" stop   ") == 1 and "told as 1" in out, (code, out, err)
+    assert code == 0 and out.count(" stop   ") == 1 and "reported as 1" in out, (code, out, err)
     everything = lines(console(rig, config, "history", ID, "--all", "--json")[1])[:-1]
-    shown = [event for event in everything if "message" in event]  # The others report what the killed leader kept from the stream, at the end.
+    shown = [event for event in everything if "message" in event]  # The other rows report events that the killed leader did not put into the stream.
     assert len(everything) - len(shown) <= 1, everything
     assert {"stop", "estop"} <= {event["message"]["event"] for event in shown} and not any(event["missing_before"] for event in shown), everything
     rows = lines(console(rig, config, "--for", "3", "--json")[1])
@@ -126,7 +126,7 @@ def test_history_tells_each_stop_once_with_gaps_and_survives_the_leader(rig):
 
 
 def test_history_with_a_frozen_first_host_checks_its_end(rig):
-    """A host that accepts connections and never answers takes the time of one greeting, and no more: the next one is asked."""
+    """A host that accepts connections and never replies costs the time of one greeting only: the console asks the next one."""
     cluster = Cluster(rig)
     config = cluster_config(rig, cluster)
     far = machine_at(rig, cluster)
@@ -144,8 +144,8 @@ def test_history_with_a_frozen_first_host_checks_its_end(rig):
         cluster.servers[HOSTS[0]].signal(signal.SIGCONT)
 
 
-def test_history_of_thousands_comes_whole_and_the_console_may_not_change_it(rig):
-    """More than the engine sends without a word of flow control; and what else the console's certificate allows."""
+def test_history_of_thousands_is_complete_and_read_only(rig):
+    """More events than the engine sends without flow control; and other rights of the console's certificate."""
     cluster = Cluster(rig)
     far = machine_at(rig, cluster)
     publish_stops(far, [("a", number, number, 0) for number in range(1, 3001)], pad=1000, qos=0)
@@ -167,7 +167,7 @@ def test_history_of_thousands_comes_whole_and_the_console_may_not_change_it(rig)
     assert cluster.stream("info")[1]["messages"] == 3000
     code, _, err = console(rig, cluster_config(rig, cluster, name="w2"), "history")
     assert code == 69 and "users.conf" in err, (code, err)
-    # A machine's certificate is none of a server's: who has one cannot play the cluster for the console.
+    # A machine's certificate is no server certificate: its owner cannot act as the cluster for the console.
     for host in HOSTS:
         cluster.servers[host].signal(9)
         cluster.servers[host].wait(5)
@@ -182,7 +182,7 @@ def test_history_of_thousands_comes_whole_and_the_console_may_not_change_it(rig)
 
 
 def nats_says(rig, cluster, name, subject):
-    """What a server answers to an empty message from this certificate."""
+    """A server's reply to an empty message with this certificate."""
     context = ssl.create_default_context(cafile=rig.path("certs/ca.pem"))
     context.load_cert_chain(rig.path(f"certs/{name}.pem"), rig.path(f"certs/{name}.key"))
     raw = socket.create_connection((HOSTS[0], cluster.nats), timeout=5)
@@ -191,13 +191,13 @@ def nats_says(rig, cluster, name, subject):
         line += raw.recv(1)
     with context.wrap_socket(raw, server_hostname=HOSTS[0]) as link:
         link.sendall(b'CONNECT {"verbose":false,"pedantic":false,"tls_required":true}\r\nPUB %s 0\r\n\r\nPING\r\n' % subject.encode())
-        said = b""
-        while b"PONG" not in said:
-            said += link.recv(4096)
-    return said.decode()
+        received = b""
+        while b"PONG" not in received:
+            received += link.recv(4096)
+    return received.decode()
 
 
-def test_history_without_a_stream_says_what_to_do_and_info_tells_the_last_stop(rig):
+def test_history_without_stream_names_fix_and_info_last_stop(rig):
     rig.start()
     rig.online()
     make_stops(rig, 1)
@@ -211,8 +211,10 @@ def test_history_without_a_stream_says_what_to_do_and_info_tells_the_last_stop(r
     assert "last stops: from each machine's info" in text and "estop_line" in text, text
     page = Path(rig.path("fleet.json"))
     assert console(rig, config, "--for", "3", "--output", str(page))[:2] == (0, "")
-    told = json.loads(page.read_text(encoding="utf-8"))
-    assert told["ok"] and not told["stream"] and abs(told["wall_us"] / 1e6 - time.time()) < 5 and [row["machine"] for row in told["machines"]] == [ID], told
+    result = json.loads(page.read_text(encoding="utf-8"))
+    assert (
+        result["ok"] and not result["stream"] and abs(result["wall_us"] / 1e6 - time.time()) < 5 and [row["machine"] for row in result["machines"]] == [ID]
+    ), result
     assert page.stat().st_mode & 0o007 == 0 and not Path(f"{page}.part").exists()
     assert console(rig, config, "--for", "3", "--output", "/proc/nowhere/x")[0] == 73
     code, _, err = console(rig, config, "history", ID)
@@ -235,14 +237,14 @@ def test_history_without_a_stream_says_what_to_do_and_info_tells_the_last_stop(r
 
 
 def folder_of(rig):
-    """Where recordings are fetched to; what is in it."""
+    """The folder for fetched recordings."""
     folder = Path(rig.path("fetched"))
     folder.mkdir(exist_ok=True)
     return folder
 
 
 def stop_with_recording(rig, seconds=0.0):
-    """A stop whose recording is whole; its name."""
+    """Makes a stop with a complete recording; returns its name."""
     time.sleep(seconds)
     make_stops(rig, 1)
     name = until(lambda: next(iter(sorted(Path(rig.folder).glob("stop-*.log"))), None), what="a recording").stem
@@ -251,7 +253,7 @@ def stop_with_recording(rig, seconds=0.0):
     return name
 
 
-def test_recording_is_fetched_whole_never_over_a_file_and_read_by_iwheelctl(rig):
+def test_recording_is_fetched_whole_and_overwrites_no_file(rig):
     rig.start()
     rig.online()
     name = stop_with_recording(rig)
@@ -266,8 +268,8 @@ def test_recording_is_fetched_whole_never_over_a_file_and_read_by_iwheelctl(rig)
         assert done.returncode == 0 and word in done.stdout, (verb, done.stdout[-500:], done.stderr)
     code, out, err = console(rig, config, "recording", ID, "-o", str(folder / "x"))
     assert code == 73 and "there already" in err and len(list(folder.iterdir())) == 3, (code, err)
-    told = lines(console(rig, config, "recording", ID, str(int(name.split("-")[1])), "--json", "-o", str(folder / "y"))[1])[0]
-    assert told["name"] == name and told["bytes"] == sum(Path(rig.path(name + ending)).stat().st_size for ending in FILES), told
+    result = lines(console(rig, config, "recording", ID, str(int(name.split("-")[1])), "--json", "-o", str(folder / "y"))[1])[0]
+    assert result["name"] == name and result["bytes"] == sum(Path(rig.path(name + ending)).stat().st_size for ending in FILES), result
     code, _, err = console(rig, config, "recording", ID, "99")
     assert code == 1 and "no recording 99" in err, (code, err)
     code, _, err = console(rig, config, "recording", "w8", "--wait", "3")
@@ -277,17 +279,17 @@ def test_recording_is_fetched_whole_never_over_a_file_and_read_by_iwheelctl(rig)
 
 
 def slow_console(rig, *words):
-    """A console behind a line on which a recording takes seconds; with `rig.line` to cut it."""
+    """A console behind a line on which a recording takes seconds; `rig.line` can cut it."""
     rig.line = Line(rig.port)
     rig.line.delay = 0.03
     rig.fars.append(rig.line)
     process = Process([rig.program("iwheel-fleet"), "-c", write_config(rig, port=rig.line.port), "recording", ID, *words], rig.path("console.out"))
     rig.processes.append(process)
-    until(lambda: any(path.stat().st_size for path in folder_of(rig).glob("x.log.*")), 15, f"it is under way: {process.text()}")
+    until(lambda: any(path.stat().st_size for path in folder_of(rig).glob("x.log.*")), 15, f"the transfer is in progress: {process.text()}")
     return process
 
 
-def test_recording_goes_on_after_the_bridge_was_killed_and_began_anew(rig):
+def test_recording_fetch_continues_after_bridge_restart(rig):
     rig.start()
     rig.online()
     name = stop_with_recording(rig, 3)
@@ -302,7 +304,7 @@ def test_recording_goes_on_after_the_bridge_was_killed_and_began_anew(rig):
     assert len(list(folder.iterdir())) == 3
 
 
-def test_recording_of_a_machine_that_stays_away_leaves_no_file_behind(rig):
+def test_recording_of_absent_machine_leaves_no_file(rig):
     rig.start()
     rig.online()
     stop_with_recording(rig, 3)
@@ -320,14 +322,14 @@ def test_recording_of_a_machine_that_stays_away_leaves_no_file_behind(rig):
 
 
 class Played(Far):
-    """A machine that the test plays: it answers as the page says, and does what `trouble` says to the piece with that number."""
+    """A machine that the test plays: it replies as on the page, and handles the piece with that number according to `trouble`."""
 
     def __init__(self, port, name, data, trouble):
         self.data, self.trouble, self.pieces, self.boot = data, trouble, 0, "first"
         super().__init__(port, name, topics=(f"iwheel/{name}/cmd/+",))
         self.client.publish(f"iwheel/{name}/availability", "online", qos=1, retain=True).wait_for_publish(3)
 
-    def take(self, client, data, message):
+    def receive(self, client, data, message):
         threading.Thread(target=self.answer, args=(message.topic.rsplit("/", 1)[1], json.loads(message.payload)), daemon=True).start()
 
     def answer(self, verb, asked):
@@ -361,7 +363,7 @@ def fetch_from(rig, name, data, trouble):
     return console(rig, write_config(rig, port=rig.port), "recording", name, "--wait", "8", "-o", str(folder_of(rig) / "x"))
 
 
-def test_recording_with_a_piece_lost_damaged_or_refused_once_is_whole_all_the_same(rig):
+def test_recording_with_piece_lost_or_refused_once_is_complete(rig):
     rig.start_broker()
     data = bytes(number * number % 251 for number in range(100000))
 
@@ -381,7 +383,7 @@ def test_recording_with_a_piece_lost_damaged_or_refused_once_is_whole_all_the_sa
     assert int(re.search(r"(\d+) requested again", out).group(1)) >= 4, out
 
 
-def test_recording_that_stays_damaged_is_told_and_leaves_no_file(rig):
+def test_recording_that_stays_damaged_fails_and_leaves_no_file(rig):
     rig.start_broker()
     data = bytes(60000)
 
@@ -404,7 +406,7 @@ def test_recording_that_stays_damaged_is_told_and_leaves_no_file(rig):
 
 
 class Far5:
-    """A client that speaks MQTT 5; keeps (topic, payload, properties)."""
+    """A client with MQTT 5; stores (topic, payload, properties)."""
 
     def __init__(self, rig, name="far5"):
         self.all, self.listens = [], threading.Event()
@@ -435,7 +437,7 @@ class Far5:
 
 
 @pytest.mark.rig(settings={"broker": {"protocol": "5"}})
-def test_mqtt5_messages_expire_but_for_events_and_answers_go_where_they_are_wanted(rig):
+def test_mqtt5_all_but_events_expire_replies_use_response_topic(rig):
     rig.start()
     far = Far5(rig)
     until(lambda: far.of("state"), what="a state")
@@ -457,8 +459,8 @@ def test_mqtt5_messages_expire_but_for_events_and_answers_go_where_they_are_want
 
 
 @pytest.mark.rig(settings={"broker": {"protocol": "5"}})
-def test_mqtt5_event_that_the_broker_refuses_is_kept_and_told_when_it_may_be(rig):
-    """By 3.1.1 a broker confirms what its ACL forbids, and nobody knows."""
+def test_mqtt5_event_refused_by_broker_is_stored_and_sent_later(rig):
+    """With 3.1.1 a broker confirms messages that its ACL forbids, so the bridge cannot know."""
     acl = Path(rig.path("acl"))
     acl.write_text(
         "topic read #\ntopic write iwheel/+/state\ntopic write iwheel/+/info\ntopic write iwheel/+/availability\ntopic write iwheel/+/event/estop\n",
@@ -470,7 +472,7 @@ def test_mqtt5_event_that_the_broker_refuses_is_kept_and_told_when_it_may_be(rig
     last = make_stops(rig, 2)
     until(lambda: "did not accept" in rig.words() and "Not authorized" in rig.words(), what=f"it is reported: {rig.words()}")
     until(lambda: far.messages("info")[-1]["events"]["aside"] >= 2, what="set aside, and counted")
-    assert len(far.events("estop")) == 4 and not far.events("stop"), "what is refused blocks nothing behind it"
+    assert len(far.events("estop")) == 4 and not far.events("stop"), "a refused event blocks no later event"
     assert far.texts("availability")[-1] == "online" and rig.words().count("connected to the broker") == 1, "a refused message ends no connection"
     acl.write_text("topic readwrite #\n", encoding="ascii")
     rig.broker.signal(1)
@@ -478,7 +480,7 @@ def test_mqtt5_event_that_the_broker_refuses_is_kept_and_told_when_it_may_be(rig
     until(lambda: far.messages("info")[-1]["events"]["aside"] == 0, 20, "nothing is set aside any more")
 
 
-def test_mqtt5_at_a_broker_that_does_not_speak_it_names_the_cure(rig):
+def test_mqtt5_at_a_broker_without_it_names_the_fix(rig):
     if not shutil.which("nats-server"):
         raise Skip("nats-server is missing (scripts/install_tools check brings it)")
     port, mqtt = free_port(), free_port()

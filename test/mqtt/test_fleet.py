@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The recipes of share/fleet as they are shipped: three servers of which the leader is killed, a mosquitto that forwards, and who may what."""
+"""The recipes of share/fleet as shipped: three servers of which the leader is killed, a forwarding mosquitto, and access rights."""
 
 import json
 import os
@@ -31,7 +31,7 @@ def make_certificates(rig):
 
 
 def with_certificate(rig, name):
-    """For a client from outside: this one's certificate."""
+    """Setup of an outside client with this certificate."""
     return lambda client: client.tls_set(rig.path("certs/ca.pem"), rig.path(f"certs/{name}.pem"), rig.path(f"certs/{name}.key"))
 
 
@@ -42,7 +42,7 @@ def use_tls(rig, host, port):
 
 
 class Cluster:
-    """Three nats-servers by the shipped configuration, on three addresses of this machine."""
+    """Three nats-servers with the shipped configuration, on three addresses of this machine."""
 
     def __init__(self, rig):
         if not shutil.which("nats-server"):
@@ -73,18 +73,18 @@ class Cluster:
         self.rig.processes.append(server)
 
     def stream(self, verb):
-        """(exit code, answer) of share/fleet/stream at a server that lives."""
+        """(exit code, reply) of share/fleet/stream at a running server."""
         host = next(host for host, server in self.servers.items() if server.child.poll() is None)
         done = subprocess.run([FLEET / "stream", f"{host}:{self.nats}", self.rig.path("certs"), verb], capture_output=True, text=True, timeout=30, check=False)
         return done.returncode, (json.loads(done.stdout) if done.returncode == 0 else done.stderr[-300:])
 
     def leader(self):
-        name = until(lambda: (told := self.stream("info"))[0] == 0 and told[1]["leader"], 20, "a leader")
+        name = until(lambda: (info := self.stream("info"))[0] == 0 and info[1]["leader"], 20, "a leader")
         return next(host for host in HOSTS if host[-1] == name[-1])
 
 
 def collector(rig, cluster, host, topics=("iwheel/+/event/+", "iwheel/+/availability")):
-    """Who keeps events: a session that outlasts its connection, so that the cluster keeps for it what it has confirmed to a machine."""
+    """A session that outlasts its connection, so the cluster stores the events for it that it has confirmed to a machine."""
     until(lambda: socket.socket().connect_ex((host, cluster.mqtt)) == 0, 10, "the server listens")
     far = Far(cluster.mqtt, "console", topics=topics, setup=with_certificate(rig, "console"), host=host, clean=False)
     rig.fars.append(far)
@@ -107,13 +107,13 @@ def test_three_servers_leader_killed_each_stop_once_in_order(rig):
     last = make_stops(rig, 3)
     until(lambda: numbers(far) == list(range(1, last + 1)), 60, "all of them")
     print(f"        leader killed: the last of {last} stops {time.monotonic() - killed:.1f} s later", flush=True)
-    far.tell("leader of three nats-servers killed, the bridge connected to it")
+    far.print_figures("leader of three nats-servers killed, the bridge connected to it")
     assert f"connected to the broker at {leader}" in rig.words()
-    until(lambda: (told := cluster.stream("info"))[0] == 0 and told[1]["messages"] > 0, 30, "the stream has a leader again, and events")
+    until(lambda: (info := cluster.stream("info"))[0] == 0 and info[1]["messages"] > 0, 30, "the stream has a leader again, and events")
 
 
 def test_confirmation_does_not_wait_for_a_stream_of_yours(rig):
-    """What docs/user/mqtt.md says of nats-server: a stream that takes nothing keeps no confirmation back, so a stream alone is no proof."""
+    """docs/user/mqtt.md says of nats-server: a stream that accepts nothing withholds no confirmation, so a stream alone proves nothing."""
     if not shutil.which("nats-server"):
         raise Skip("nats-server is missing (scripts/install_tools check brings it)")
     port, mqtt = free_port(), free_port()
@@ -142,7 +142,7 @@ def test_confirmation_does_not_wait_for_a_stream_of_yours(rig):
 
 
 def start_fleet_broker(rig):
-    """share/fleet/mosquitto.conf with its paths in our folder; its port."""
+    """Starts a broker with share/fleet/mosquitto.conf and paths in our folder; returns its port."""
     make_certificates(rig)
     port = free_port()
     text = (FLEET / "mosquitto.conf").read_text(encoding="utf-8").replace("/etc/mosquitto/certs", rig.path("certs")).replace("8883", str(port))
@@ -167,7 +167,7 @@ def test_machine_reaches_nothing_of_another_machine(rig):
     first.client.publish("iwheel/w1/event/stop", '{"id":"1","event":"stop"}', qos=1).wait_for_publish(3)
     console.client.publish("iwheel/w1/event/stop", "forged", qos=1).wait_for_publish(3)
     console.client.publish("iwheel/w2/cmd/stop", "asked", qos=1).wait_for_publish(3)
-    until(lambda: console.all and second.all, what="what is allowed arrives")
+    until(lambda: console.all and second.all, what="permitted messages arrive")
     time.sleep(0.3)
     assert [topic for topic, *_ in second.all] == ["iwheel/w2/cmd/stop"], second.all
     assert [(topic, payload) for topic, payload, *_ in console.all if "/cmd/" not in topic] == [("iwheel/w1/event/stop", b'{"id":"1","event":"stop"}')], (
@@ -175,7 +175,7 @@ def test_machine_reaches_nothing_of_another_machine(rig):
     )
 
 
-def test_mosquitto_that_forwards_keeps_what_the_fleet_cannot_take(rig):
+def test_forwarding_mosquitto_stores_while_fleet_is_down(rig):
     port = start_fleet_broker(rig)
     central = rig.processes[-1]
     text = (
@@ -192,7 +192,7 @@ def test_mosquitto_that_forwards_keeps_what_the_fleet_cannot_take(rig):
     rig.start_bridge()
     console = fleet_far(rig, port, "console", clean=False)
     until(lambda: console.texts("availability")[-1:] == ["online"], 15, "online, forwarded")
-    assert console.ask("stop")["ok"], "commands and answers are forwarded, and young enough"
+    assert console.ask("stop")["ok"], "commands and replies are forwarded, and recent enough"
     first = make_stops(rig, 1)
     until(lambda: numbers(console) == [first], 10, "a stop, forwarded")
     central.signal(15)
@@ -202,7 +202,7 @@ def test_mosquitto_that_forwards_keeps_what_the_fleet_cannot_take(rig):
     until(lambda: numbers(console) == list(range(first, last + 1)), 40, "all of them")
 
 
-def test_console_shows_who_is_there_and_who_stopped(rig):
+def test_console_shows_online_and_stopped_machines(rig):
     rig.start()
     rig.online()
     config = Path(rig.path("fleet.conf"))

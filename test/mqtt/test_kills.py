@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The history of a fleet while nats-servers die: what the stream lacks is reported. IWHEEL_KILLS=100 pytest test/mqtt -k kills for the long form."""
+"""The history of a fleet while nats-servers die: events missing in the stream are reported. IWHEEL_KILLS=100 pytest test/mqtt -k kills for the long form."""
 
 import contextlib
 import json
@@ -19,7 +19,7 @@ KILLS = int(os.environ.get("IWHEEL_KILLS", "4"))
 
 
 class Teller:
-    """As much of a gateway as the bridge needs, without wheels: it says `stop` when the test wants it."""
+    """The part of a gateway that the bridge needs, without wheels: it sends `stop` when the test wants it."""
 
     def __init__(self, path):
         self.number, self.wall_us, self.clients, self.watchers = 0, 0, [], []
@@ -33,14 +33,14 @@ class Teller:
         while True:
             link = self.listener.accept()[0]
             self.clients.append(link)
-            self.say(
+            self.send(
                 link,
                 {"event": "hello", "t_us": time.monotonic_ns() // 1000, "name": "iwheel-gateway", "api": 1, "client": len(self.clients), "rights": "watch"},
             )
             threading.Thread(target=self.serve, args=(link,), daemon=True).start()
 
     @staticmethod
-    def say(link, message):
+    def send(link, message):
         with contextlib.suppress(OSError):
             link.sendall(json.dumps(message, separators=(",", ":")).encode() + b"\n")
 
@@ -56,23 +56,23 @@ class Teller:
                 self.watchers.append(link)
             elif asked["cmd"] == "why":
                 reply |= self.stop_fields()
-            self.say(link, reply)
+            self.send(link, reply)
 
     def tick(self):
         while True:
             for link in list(self.watchers):
-                self.say(link, {"event": "state", "t_us": time.monotonic_ns() // 1000, "state": "listening"})
+                self.send(link, {"event": "state", "t_us": time.monotonic_ns() // 1000, "state": "listening"})
             time.sleep(1)
 
     def stop(self):
         self.number += 1
         self.wall_us = time.time_ns() // 1000
         for link in list(self.watchers):
-            self.say(link, {"event": "stop", "t_us": time.monotonic_ns() // 1000, **self.stop_fields()})
+            self.send(link, {"event": "stop", "t_us": time.monotonic_ns() // 1000, **self.stop_fields()})
 
 
 def judge(rig, config, teller, far):
-    """What the stream lacks, as counted by the stops that there were; and what the history reports of it."""
+    """Compares the stops missing in the stream, counted by the test, with the report of the history."""
 
     def delivered():
         info = (far.messages("info") or [{}])[-1]
@@ -81,7 +81,7 @@ def judge(rig, config, teller, far):
     until(delivered, 90, f"the machine has delivered all: {far.messages('info')[-1:]}, {rig.words()[-2000:]}")
 
     def read():
-        """While the servers agree on a leader again, a history may say that its end is not checked: that is no answer yet."""
+        """While the servers elect a leader, a history may report that its end is not checked: then it is read again."""
         code, out, err = console(rig, config, "history", ID, "--last", "2h", "--json", timeout=120)
         read = lines(out) if code == 0 else []
         return read if read and read[-1]["end_checked"] else print("        ", err.strip(), read[-1:])
@@ -89,7 +89,7 @@ def judge(rig, config, teller, far):
     *events, total = until(read, 90, "the history with its end checked")
     there = {event["message"]["number"] for event in events if "message" in event}
     missing = set(range(1, teller.number + 1)) - there
-    leading = min(missing, default=0) == 1 and (min(there, default=teller.number + 1) - 1)  # Without an event before it a first one has no gap.
+    leading = min(missing, default=0) == 1 and (min(there, default=teller.number + 1) - 1)  # The first event has no gap before it if there is no earlier event.
     assert total["stops_missing"] == len(missing) - leading, (total, sorted(missing), events[-3:])
     return len(missing)
 
@@ -107,7 +107,7 @@ def kill_and_stop(rig, cluster, teller, host):
 
 @pytest.mark.limit(240 + 60 * KILLS)
 def test_history_under_kills_reports_each_gap(rig):
-    """Leader and follower of the stream in turn; each stop is in the history, or reported as missing, also at the end."""
+    """Kills leader and follower of the stream in turn; each stop is in the history, or reported as missing, also at the end."""
     cluster = Cluster(rig)
     config = cluster_config(rig, cluster)
     far = collector(rig, cluster, HOSTS[0], ("iwheel/+/event/+", "iwheel/+/availability", "iwheel/+/info"))

@@ -12,11 +12,11 @@ from mqtt_rig import ID
 from trials import Driver, braking_ms, until
 
 DRIVING = {"driving": True, "settings": {"state": {"every_ms": 100}}, "config": {"drive": {"lease_ms": 400}}}
-STOP_MS = 200  # From the command at the broker to the first smaller setpoint on the bus.
+STOP_MS = 200  # Limit from the command at the broker to the first smaller setpoint on the bus.
 
 
 class Flood(threading.Thread):
-    """A sender that asks `verb` so often in a second, each time as younger than a state that has come just now."""
+    """A sender that sends `verb` at this rate, each time with a quote of the newest state."""
 
     def __init__(self, rig, verb, rate, name="flood", names=1, **fields):
         super().__init__(daemon=True)
@@ -65,7 +65,7 @@ def test_stop_never_waits_behind_questions(rig):
 
 @pytest.mark.rig(settings={"state": {"every_ms": 100}})
 def test_stop_never_refused_for_other_senders(rig):
-    """More senders than the bridge knows, and one that uses up the numbers of the person who stops."""
+    """There are more senders than the bridge stores, and one that uses up the numbers of the person who stops."""
     rig.start()
     far = rig.online()
     crowd = Flood(rig, "hello", 100, name="crowd", names=40)
@@ -117,8 +117,8 @@ def test_one_person_drives_and_the_second_is_busy(rig):
     until(lambda: turns(rig), what="anna drives")
     begun_us = now_us()
     for fields in ({}, {"takeover": True}):
-        told = second.ask("arm", **fields)
-        assert not told["ok"] and told["error"] == ("stale_command" if fields else "busy") and "anna" in told["message"], told
+        reply = second.ask("arm", **fields)
+        assert not reply["ok"] and reply["error"] == ("stale_command" if fields else "busy") and "anna" in reply["message"], reply
     for number, (sender, fields) in enumerate((("ben", {}), ("ben", {"key": "0" * 32}), ("anna", {}), ("anna", {"key": "f" * 32}))):
         second.send("drive", **{"from": sender, "seq": (1 << 40) + number, **second.quote(), "left_mm_s": -300, "right_mm_s": -300, **fields})
         time.sleep(0.1)
@@ -134,7 +134,7 @@ def test_one_person_drives_and_the_second_is_busy(rig):
 
 
 @pytest.mark.rig(**DRIVING)
-def test_one_person_hands_over_at_standstill_only(rig):
+def test_one_person_passes_control_only_at_standstill(rig):
     rig.start()
     first, second = rig.online(rig.far("anna")), rig.far("ben")
     until(lambda: first.texts("state"), what="a state")
@@ -142,18 +142,18 @@ def test_one_person_hands_over_at_standstill_only(rig):
     hand = Hand(first, 0)
     time.sleep(0.4)
     assert second.ask("arm")["error"] == "busy"
-    told = until(lambda: (answer := second.ask("arm", takeover=True))["ok"] and answer, what="taken over at standstill")
+    reply = until(lambda: (answer := second.ask("arm", takeover=True))["ok"] and answer, what="taken over at standstill")
     hand.end()
-    assert told["key"] != first.key
+    assert reply["key"] != first.key
     refused = first.ask("drive", key=first.key, left_mm_s=100, right_mm_s=100)
     assert refused["error"] == "not_holder", refused
-    second.key = told["key"]
+    second.key = reply["key"]
     assert second.ask("drive", key=second.key, left_mm_s=0, right_mm_s=0)["ok"]
 
 
 @pytest.mark.rig(**DRIVING)
 def test_one_person_with_a_deflected_stick_refuses_arm_and_reset(rig):
-    """Row 7: no command of that person is accepted, and yet nothing is armed or reset while it comes, under its own name or another's."""
+    """Row 7: the bridge accepts no command of that person, and refuses arm and reset while its commands come, under its own name or another's."""
     rig.start()
     first, second = rig.online(rig.far("anna")), rig.far("ben")
     until(lambda: second.texts("state"), what="a state")
@@ -161,17 +161,17 @@ def test_one_person_with_a_deflected_stick_refuses_arm_and_reset(rig):
     hand = Hand(second, 150)
     time.sleep(0.3)
     for asks in (first, second):
-        told = asks.ask("arm")
-        assert told["error"] == "stale_command" and "ben" in told["message"], told
+        reply = asks.ask("arm")
+        assert reply["error"] == "stale_command" and "ben" in reply["message"], reply
     rig.press()
     rig.press(False)
     number = until(lambda: first.ask("why")["number"], what="a stop")
     time.sleep(1.2)
-    told = first.ask("reset", stop=number)
-    assert told["error"] == "stale_command" and "ben" in told["message"], told
+    reply = first.ask("reset", stop=number)
+    assert reply["error"] == "stale_command" and "ben" in reply["message"], reply
     hand.end()
     time.sleep(0.6)
-    assert until(lambda: (answer := first.ask("reset", stop=number))["ok"] and answer, what="reset, with the stick let go")
+    assert until(lambda: (answer := first.ask("reset", stop=number))["ok"] and answer, what="reset, after the stick is released")
     assert not turns(rig)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a broker does not accept, who may be the broker, whose name and files are used, and which refusals are reported."""
+"""Events that a broker does not accept, the identity of the broker, names and files of others, and reports of refusals."""
 
 import os
 import shutil
@@ -25,12 +25,12 @@ def need_root():
         raise Skip("another user's process needs root")
 
 
-# ---- what a broker never accepts ------------------------------------------------------------------------------------
+# ---- events that a broker never accepts -----------------------------------------------------------------------------
 
 
 @pytest.mark.rig(settings={"broker": {"protocol": "5"}})
 def test_event_too_large_is_set_aside_and_later_ones_go(rig):
-    """The broker's largest packet is smaller than a stop, info and state: what fits arrives, the rest when it fits."""
+    """The broker's largest packet is smaller than a stop, info and state: messages that fit arrive, the rest after they fit."""
     rig.broker_lines.append("max_packet_size 420")
     line = rig.cut_here()
     rig.start()
@@ -47,9 +47,9 @@ def test_event_too_large_is_set_aside_and_later_ones_go(rig):
 
 
 class Choosy(Line):
-    """A broker of MQTT 3.1.1 that ends the connection with which an event comes that it does not accept."""
+    """A broker of MQTT 3.1.1 that ends the connection over which it receives an event that it does not accept."""
 
-    CHUNK = 65536  # The word must not be split.
+    CHUNK = 65536  # The name of the event must not be split.
 
     def __init__(self, port, word):
         self.word, self.ended = word, 0
@@ -77,11 +77,11 @@ def test_event_that_ends_each_connection_is_set_aside(rig):
     assert not far.events("lease") and line.ended < 40, line.ended
 
 
-# ---- whose name it is -----------------------------------------------------------------------------------------------
+# ---- the client's name ----------------------------------------------------------------------------------------------
 
 
 def thief(rig, port, name, certificate, host="127.0.0.1", **options):
-    """A client that takes this name again and again."""
+    """A client that connects with this name again and again."""
     client = paho.Client(paho.CallbackAPIVersion.VERSION2, client_id=name, **options)
     client.reconnect_delay_set(0.05, 0.1)
     if certificate:
@@ -93,7 +93,7 @@ def thief(rig, port, name, certificate, host="127.0.0.1", **options):
     return client
 
 
-def test_machine_cannot_take_the_name_of_another_at_mosquitto(rig):
+def test_machine_cannot_use_the_name_of_another_at_mosquitto(rig):
     port = start_fleet_broker(rig)
     use_tls(rig, "localhost", port)
     rig.start_gateway()
@@ -107,8 +107,8 @@ def test_machine_cannot_take_the_name_of_another_at_mosquitto(rig):
         one.close()
 
 
-def test_machine_cannot_take_the_name_of_another_at_nats(rig):
-    """nats-server ties no name to a user: the bridge's own is random in each run, so that nobody can name it."""
+def test_machine_cannot_use_the_name_of_another_at_nats(rig):
+    """nats-server ties no name to a user: the bridge's name is random in each run, so no other client can know it."""
     cluster = Cluster(rig)
     use_tls(rig, HOSTS[0], cluster.mqtt)
     rig.start_gateway()
@@ -122,7 +122,7 @@ def test_machine_cannot_take_the_name_of_another_at_nats(rig):
 
 
 def test_name_used_by_another_client_is_reported(rig):
-    """Two programs with one certificate; by MQTT 5 the broker says so, by 3.1.1 it only ends the connection."""
+    """Two programs with one certificate; with MQTT 5 the broker reports it, with 3.1.1 it only ends the connection."""
     port = start_fleet_broker(rig)
     rig.start_gateway()
     for protocol in ("3.1.1", "5"):
@@ -137,7 +137,7 @@ def test_name_used_by_another_client_is_reported(rig):
         os.unlink(rig.path("mqtt.out"))
 
 
-# ---- who may be the broker ------------------------------------------------------------------------------------------
+# ---- the identity of the broker -------------------------------------------------------------------------------------
 
 LISTENER = """
 import os, socket, sys
@@ -168,7 +168,7 @@ def test_stranger_on_loopback_gets_no_password_and_no_command(rig):
     secret.chmod(0o600)
     rig.mqtt_settings["broker"]["credentials"] = str(secret)
     rig.start_gateway()
-    for how in ("accepts", "waits"):  # What is not accepted yet the kernel shows as root's.
+    for how in ("accepts", "waits"):  # The kernel shows root as the owner of a connection that is not accepted yet.
         stranger = Process([sys.executable, "-c", LISTENER, str(rig.port), how], rig.path(f"{how}.out"))
         rig.processes.append(stranger)
         until(lambda one=stranger: "listens" in one.text(), what="the stranger listens")
@@ -270,13 +270,13 @@ def test_key_that_others_may_read_is_refused(rig):
     write_settings(rig, host="localhost", ca=rig.path("ca.pem"), certificate=rig.path("machine.pem"), key=str(key))
     for mode, code in ((0o644, 77), (0o640, 77 if os.geteuid() else 0), (0o600, 0)):
         key.chmod(mode)
-        said = check(rig)
-        assert said[0] == code, (oct(mode), said)
+        checked = check(rig)
+        assert checked[0] == code, (oct(mode), checked)
         assert code or rig.start_bridge().child.poll() is None, oct(mode)
         rig.bridge and rig.bridge.end()
 
 
-def test_spool_of_a_stranger_is_refused_and_links_are_not_followed(rig):
+def test_spool_of_other_owner_is_refused_and_no_link_followed(rig):
     need_root()
     spool, other = Path(rig.path("spool")), Path(rig.path("other"))
     other.write_text("of somebody", encoding="ascii")
@@ -306,7 +306,7 @@ def test_spool_of_a_stranger_is_refused_and_links_are_not_followed(rig):
 
 
 @pytest.mark.rig(settings={"home_assistant": {"enabled": "yes"}})
-def test_home_assistant_sensors_pass_the_shipped_rights_of_mosquitto(rig):
+def test_home_assistant_sensors_pass_shipped_mosquitto_rights(rig):
     port = start_fleet_broker(rig)
     certificates(rig, "console", "homeassistant")
     use_tls(rig, "localhost", port)

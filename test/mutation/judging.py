@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The judgement of one mutant: who sees it, or which compiler proves that there is nothing to see."""
+"""Judges one mutant: which test kills it, or which compiler proves that it is equivalent."""
 
 import collections
 import hashlib
@@ -12,17 +12,17 @@ from core_build import CORE, INCLUDE, ROOT, SLOW
 from mutants import files, functions
 
 KILLED, ENDLESS, SAME, LIVES, INVALID = "killed", "does not end", "same code", "lives", "does not compile"
-# If one of them makes the same object of it as of the core as it is, it is the same program.
+# A compiler that makes the same object code of the mutant and of the core proves that both are the same program.
 COMPILERS = (("gcc", "-O2"), ("gcc", "-O3"), ("gcc", "-Os"), ("clang", "-O2"))
-SMALL = "-Os"  # Leaves out parts of functions in headers (__OPTIMIZE_SIZE__): it proves nothing there.
+SMALL = "-Os"  # This level omits parts of functions in headers (__OPTIMIZE_SIZE__), so it proves nothing about headers.
 PROBE = "probe.c"
 WHOLE_CORE = (("orders", "test_orders", lambda judges, core: judges.orders(core)), ("simulation", "test_sim", lambda judges, core: judges.sim(core, 1)))
 
 
 class Verdict(NamedTuple):
     kind: str
-    program: str = ""  # Who sees it.
-    test: str = ""  # Which of its tests, if it is a unit test that fails and not one that crashes.
+    program: str = ""  # The test program that kills it.
+    test: str = ""  # The failed test of that program; empty if the program crashed.
 
 
 def digest(text):
@@ -33,7 +33,7 @@ INCLUDED = re.compile(r'^#include "([^"]+)"', re.M)
 
 
 def implemented():
-    """{header: the files of the core that include it first: those which are behind it}"""
+    """{header: the core's files that include it first, so the sources that implement it}"""
     found = collections.defaultdict(list)
     for path in sorted(CORE.glob("*.c")):
         header = INCLUDED.search(path.read_text())[1]
@@ -42,7 +42,7 @@ def implemented():
 
 
 def reach(sources):
-    """The files of the core that these can call into: those whose headers they include, and so on."""
+    """The core's files that these can call: those whose headers they include, recursively."""
     todo, seen, behind = list(sources), set(), implemented()
     while todo:
         path = todo.pop()
@@ -55,7 +55,7 @@ def reach(sources):
 
 
 class Judge:
-    """Judges mutants; learns which test kills the mutants of which file."""
+    """Judges mutants and learns which test kills the mutants of which file."""
 
     def __init__(self, judges):
         self.judges, self.kills, self.lock = judges, collections.defaultdict(collections.Counter), threading.Lock()
@@ -65,13 +65,13 @@ class Judge:
         self.optimised = {}
 
     def clean(self):
-        """What the judges have against the core as it is; they are worth nothing then."""
+        """The failures of the judges with the unchanged core; with any of these the judges prove nothing."""
         found = self.judges.failing(self.judges.clean, sorted(self.judges.tests))
         wrong = [found[1] or f"unit_{found[0]} {found[2].how}"] if found else []
-        return wrong + [said for _, _, hears in WHOLE_CORE if (said := hears(self.judges, self.judges.clean))]
+        return wrong + [output for _, _, kills in WHOLE_CORE if (output := kills(self.judges, self.judges.clean))]
 
     def order(self, mutant):
-        """Unit tests that sweep every value come after the others; those that killed most of the function's mutants come first."""
+        """The order of the unit tests: programs that killed most mutants of the function first, those that sweep every value last."""
         kills, stem = self.kills[mutant.file, mutant.function], mutant.file.rpartition(".")[0]
         found = sorted(
             (name for name in self.judges.tests if mutant.file in self.reach[f"unit_{name}"]), key=lambda name: (-kills[name], stem not in name, name)
@@ -79,7 +79,7 @@ class Judge:
         return [name for name in found if name not in SLOW], [name for name in found if name in SLOW]
 
     def objects_of(self, folder, file):
-        """What optimising compilers make of it, one after the other; of a header, of each of its functions by itself."""
+        """The object code of each optimising compiler; for a header, of each of its functions separately."""
         compilers = COMPILERS
         if file.endswith(".h"):
             compilers = [row for row in COMPILERS if SMALL not in row]
@@ -110,14 +110,14 @@ class Judge:
         return Verdict(ENDLESS if run.endless else KILLED, program, test or "")
 
     def changed_source(self, mutant):
-        """The folder of the file with this mutant alone."""
+        """The folder of the file with only this mutant."""
         folder = self.judges.work / "alone" / digest(f"{mutant.file}{mutant.begin}{mutant.text}{mutant.end}")
         folder.mkdir(parents=True)
         (folder / mutant.file).write_text(mutant.apply(self.sources[mutant.file]))
         return folder
 
     def judge(self, mutant, core):
-        """`core` has the mutant in force; None if it does not compile."""
+        """Judges the mutant in `core`; `core` is None if the mutant does not compile."""
         if core is None:
             return Verdict(INVALID)
         quick, slow = self.order(mutant)
@@ -128,5 +128,5 @@ class Judge:
         if verdict:
             return verdict
         return next(
-            (Verdict(KILLED, means) for means, program, hears in WHOLE_CORE if mutant.file in self.reach[program] and hears(self.judges, core)), Verdict(LIVES)
+            (Verdict(KILLED, means) for means, program, kills in WHOLE_CORE if mutant.file in self.reach[program] and kills(self.judges, core)), Verdict(LIVES)
         )

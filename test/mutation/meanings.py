@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Bugs as people make them around the core: in daemon, Linux port and STM32 driver. One change each, by meaning rather than by operator."""
+"""Semantic mutants of the code around the core: daemon, Linux port and STM32 driver. Each makes one mistake that a programmer could make."""
 
 import itertools
 import re
@@ -11,13 +11,13 @@ LEAVES = ("ReturnStmt", "BreakStmt", "ContinueStmt", "GotoStmt")
 CLOCKS = {"CLOCK_MONOTONIC": "CLOCK_REALTIME", "CLOCK_BOOTTIME": "CLOCK_MONOTONIC", "CLOCK_REALTIME": "CLOCK_MONOTONIC"}
 TIME = re.compile(r"_(?:ns|us|ms|s)$", re.IGNORECASE)
 LIMITS = {"<": "<=", "<=": "<", ">": ">=", ">=": ">", "&&": "||", "||": "&&", "+": "-", "-": "+"}
-# What these do to other processes no test may try out.
+# Calls that affect other processes: no test may run a mutant of them.
 DANGEROUS = re.compile(r"\b(?:kill|killpg|reboot)\(")
 OTHER = {"left": "right", "right": "left"}
 
 
 def calls(node):
-    """True if a function is called in it."""
+    """True if the node calls a function."""
     return node.get("kind") == "CallExpr" or any(calls(child) for child in node.get("inner", ()))
 
 
@@ -40,7 +40,7 @@ class Meanings(Finder):
         for child in children[1:] if node.get("kind") == "CaseStmt" else children:
             if "kind" in child:
                 self.visit(child, node)
-        if node.get("kind") == "VarDecl":  # From here on: compilers tell of one that is used in its own beginning.
+        if node.get("kind") == "VarDecl":  # Usable only from here on: compilers warn of a variable that is used in its own initialiser.
             self.times.append((node["name"], node["type"]["qualType"]))
 
     def mean_IfStmt(self, node):
@@ -70,15 +70,15 @@ class Meanings(Finder):
                 self.add("event not skipped", self.span(child), "")
 
     def is_order_free(self, one, other):
-        """Nobody can tell which came first: members of an object, assignments of which neither has to do with the other, a line in the log beside what it does not tell."""
+        """True if the order of two statements has no effect: members of one object, independent assignments, or a log line next to a statement that it does not report."""
         texts = [self.text(node) for node in (one, other)]
         targets = [None if calls(node) else self.text(node["inner"][0]).lstrip("*") for node in (one, other)]
         logs = [text.startswith("sock_log(") for text in texts]
         if all(text.startswith("iwn_out_") for text in texts):
             return True
         if logs[0] != logs[1]:
-            told, target = texts[logs.index(True)].partition(",")[2], targets[logs.index(False)]
-            return target not in told if target else not re.search(r"->|\w\(", told)
+            arguments, target = texts[logs.index(True)].partition(",")[2], targets[logs.index(False)]
+            return target not in arguments if target else not re.search(r"->|\w\(", arguments)
         return all(targets) and targets[0] not in texts[1] and targets[1] not in texts[0]
 
     def mean_DeclRefExpr(self, node):

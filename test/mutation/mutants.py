@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 CORE, PUBLIC = ROOT / "core/src", ROOT / "core/include/iwheel"
-# Macros that only hint: what they are given is looked at as if they were not there.
+# Macros that are only hints: their arguments are parsed as if the macros were absent.
 HINTS = ("IW_CODEC_LIKELY",)
 OPERATORS = {
     "<": ("<=", ">="),
@@ -49,13 +49,13 @@ class Mutant(NamedTuple):
     kind: str
     begin: int
     end: int
-    text: str  # Instead of what stands there.
+    text: str  # The replacement.
 
     def apply(self, source):
         return source[: self.begin] + self.text + source[self.end :]
 
     def key(self, source):
-        """Names it without line numbers: the line before and after."""
+        """A name without line numbers: the line before and after the change."""
         from_line, to_line = source.rfind("\n", 0, self.begin) + 1, source.find("\n", self.end)
         before = " ".join(source[from_line:to_line].split())
         after = " ".join((source[from_line : self.begin] + self.text + source[self.end : to_line]).split())
@@ -95,7 +95,7 @@ class Finder:
             self.found.append(Mutant(self.name, self.function, kind, *span, text))
 
     def span(self, node):
-        """Where it stands; None if it has to do with a macro that takes arguments."""
+        """Where it is in the file; None inside a macro that has arguments."""
         begin, _, in_macro = place(node["range"]["begin"])
         end, length, ends_in_macro = place(node["range"]["end"])
         if begin is None or end is None:
@@ -201,17 +201,17 @@ def function_spans(source):
 
 
 def functions(path):
-    """{function: its text}, for telling whether it changed."""
+    """{function: its text}, for finding out whether it changed."""
     source = Path(path).read_text()
     return {name: source[begin:end] for name, (begin, end) in function_spans(source).items()}
 
 
 def files():
-    """The core's sources, and those of its headers that have functions."""
+    """The core's sources and those headers of the core that contain functions."""
     headers = [path for folder in (PUBLIC, CORE) for path in sorted(folder.glob("*.h"))]
     return sorted(CORE.glob("*.c")) + [path for path in headers if functions(path)]
 
 
 def mutants(path, finder=Finder):
-    """Each change once."""
+    """Every change, each only once."""
     return list({(mutant.begin, mutant.end, mutant.text): mutant for mutant in reversed(finder(path).found)}.values())[::-1]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The lists of mutants that no test can see, and the names of mutants in them."""
+"""The lists of mutants that no test can detect, and the names of mutants in them."""
 
 import collections
 
@@ -7,13 +7,13 @@ from mutants import mutants
 
 
 def read_reasons(path):
-    """{key: reason} of a list of what no test can see."""
+    """{key: reason} of such a list."""
     lines = [line for line in path.read_text().splitlines() if line.strip() and not line.startswith("#")]
     return {key.strip(): reason.strip() for key, _, reason in (line.rpartition(" | ") for line in lines)}
 
 
 def settle(named, found):
-    """Entries of a list whose file or function has another name now follow it, if their lines occur once."""
+    """Updates entries whose file or function has been renamed, if their lines occur only once."""
     by_lines = collections.defaultdict(list)
     for key in found:
         by_lines[key.split(" | ", 2)[2]].append(key)
@@ -24,7 +24,7 @@ def settle(named, found):
 
 
 def keyed(path, found=None):
-    """{key: mutant} of a file, named without line numbers; of mutants that look the same, the second is (2)."""
+    """{key: mutant} of a file, named without line numbers; the second of two equal names ends with (2)."""
     source, seen, named = path.read_text(), collections.Counter(), {}
     for mutant in mutants(path) if found is None else found:
         key = mutant.key(source)

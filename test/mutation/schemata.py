@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """All mutants of a file of the core in one library, so that judging one costs no compilation.
 
-Of each function there is one copy per mutant beside the one as it is; under the function's own name stands a switch. Which
-mutant is in force is told by the environment when the library is loaded. Mutants of functions that stand in headers are in
-force in whoever includes them, judges too.
+The library contains one copy of each function per mutant and one unchanged copy; under the name of the function there is a switch.
+An environment variable selects the mutant when the library is loaded. A mutant of a function in a header is enabled in every source
+that includes the header, test programs too.
 """
 
 import re
@@ -16,7 +16,7 @@ extern int atoi(const char *);
 int iw_mutant;
 __attribute__((constructor)) static void iw_choose_mutant(void) {{ const char *text = getenv("{NUMBER}"); iw_mutant = text ? atoi(text) : 0; }}
 """
-TOLD = "extern int iw_mutant;\n"
+SELECTED = "extern int iw_mutant;\n"
 
 
 def argument_names(signature):
@@ -25,7 +25,7 @@ def argument_names(signature):
 
 
 def copies(source, name, span, numbered):
-    """The function's text `numbered` times: [(number, text)], and the switch."""
+    """The function's text `numbered` times: [(number, text)], and the switch between them."""
     at = source.index("{\n", span[0])
     signature = " ".join(source[span[0] : at].split())
     own = signature if signature.startswith("static ") else f"static {signature}"
@@ -40,7 +40,7 @@ def copies(source, name, span, numbered):
 
 
 def compose(source, numbered, head):
-    """(the text of the file with all of them, [(first line, last line, number)] of the copies)"""
+    """(the text of the file with all mutants, [(first line, last line, number)] of the copies)"""
     text, lines, last = head, [], 0
     for name, span in sorted(function_spans(source).items(), key=lambda item: item[1]):
         mine = [(number, mutant) for number, mutant in numbered if mutant.function == name]
@@ -57,22 +57,22 @@ def compose(source, numbered, head):
 
 
 def build(judges, name, paths, mutants):
-    """{mutant: its core, or None if it does not compile}; of one source, or of headers."""
+    """{mutant: its core, or None if it does not compile}; for one source, or for headers."""
     headers, invalid = paths[0].suffix == ".h", set()
     while True:
         composed, lines = {}, []
         for path in paths:
             mine = [(number, mutant) for number, mutant in enumerate(mutants, 1) if number not in invalid and mutant.file == path.name]
-            composed[path], own = compose(path.read_text(), mine, TOLD if headers else WHICH)
+            composed[path], own = compose(path.read_text(), mine, SELECTED if headers else WHICH)
             lines += [(path.name, *line) for line in own]
         if headers:
-            core, said = judges.change_headers(name, composed, WHICH)
+            core, output = judges.change_headers(name, composed, WHICH)
         else:
-            core, said = judges.change(name, paths[0].name, composed[paths[0]])
+            core, output = judges.change(name, paths[0].name, composed[paths[0]])
         if core:
             return {mutant: None if number in invalid else core._replace(number=number) for number, mutant in enumerate(mutants, 1)}
-        wrong = {(file, int(line)) for file, line in re.findall(r"^\S*?([^\s/]+):(\d+):\d+: error:", said, re.M)}
+        wrong = {(file, int(line)) for file, line in re.findall(r"^\S*?([^\s/]+):(\d+):\d+: error:", output, re.M)}
         found = {number for file, begin, end, number in lines if number and any(file == other and begin <= line <= end for other, line in wrong)}
         if not found:
-            raise RuntimeError(said)
+            raise RuntimeError(output)
         invalid |= found

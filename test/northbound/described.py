@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""share/northbound.json for tests: whether what a program sends, or a page shows, fits the description of the protocol."""
+"""share/northbound.json for tests: compares what a program sends, or a page shows, with the description of the protocol."""
 
 import os
 import sys
@@ -12,7 +12,7 @@ FIELD_KEYS = {"type", "list", "keys", "null", "optional", "unit", "what", "least
 
 
 class Description(northbound.Description):
-    """The description, with judges of its form and of what others make of it."""
+    """The description, with checks of its form and of its use."""
 
     def reply(self, cmd):
         return self.fields(self.objects[self.requests[cmd]["reply"]])
@@ -21,14 +21,14 @@ class Description(northbound.Description):
         return self.fields(self.events[name])
 
     def unit(self, name, field):
-        """In words; None: it has none."""
+        """The unit as text; None: the field has no unit."""
         if "unit" in field:
             return field["unit"]
         ends = [end for end in self.units if name == end or name.endswith("_" + end)]
         return self.units[max(ends, key=len)] if ends and field["type"] == "integer" else None
 
     def faults(self):
-        """What is wrong with the description itself."""
+        """Mistakes of the description itself."""
         holders = [("objects", self.objects), ("requests", self.requests), ("events", self.events), ("serial", self.raw["serial"])]
         for group, members in holders:
             for member, holder in members.items():
@@ -44,7 +44,7 @@ class Description(northbound.Description):
     def _field_faults(self, where, name, field):
         kinds = field["type"] if isinstance(field["type"], list) else [field["type"]]
         for key in set(field) - FIELD_KEYS:
-            yield f"{where}: what is {key}?"
+            yield f"{where}: the key {key} is unknown"
         for kind in kinds:
             if kind not in northbound.PLAIN and kind not in self.words and kind not in self.objects:
                 yield f"{where}: {kind} is no type"
@@ -52,7 +52,7 @@ class Description(northbound.Description):
             yield f"{where}: an integer without a unit"
 
     def complaints(self, value, fields, where, complete=True):
-        """What about an object does not fit these fields, as sentences. `complete`: a field that is missing is one of them."""
+        """The differences between an object and these fields, as sentences. `complete`: a missing field is a difference."""
         if not isinstance(value, dict):
             return [f"{where}: {value!r} is no object"]
         found = [f"{where}.{name} is not in share/northbound.json" for name in value if name not in fields]

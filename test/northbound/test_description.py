@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""docs/user/northbound.md, and the words and limits of the C sources, agree with share/northbound.json, the description of the protocol.
+"""Compares docs/user/northbound.md, and the words and limits of the C sources, with share/northbound.json, the description of the protocol.
 
 usage: test_description.py [unittest's arguments]
 
@@ -14,7 +14,7 @@ import unittest
 
 from described import ROOT, Description
 
-# Where the words are kept: the function whose texts they are, and what else is among them; or several of these.
+# The sources of the words: file, function that contains them, and its other texts; or several of these.
 SOURCES = {
     "error": ("lib/northbound/protocol/src/words.c", "iwn_error_name", {"ok"}),
     "topic": ("lib/northbound/protocol/src/words.c", "iwn_topic_name", set()),
@@ -47,14 +47,14 @@ def read(path):
 
 
 def section(text, heading):
-    """What stands under a heading, down to the next of its level or above."""
+    """The text under a heading, until the next heading of its level or above."""
     level = heading.split(" ")[0]
     match = re.search(rf"^{re.escape(heading)}\n(.*?)(?=^#{{1,{len(level)}}} |\Z)", text, re.MULTILINE | re.DOTALL)
     return match.group(1) if match else ""
 
 
 def tokens(text):
-    """Single words out of what stands in backquotes."""
+    """Single words of the texts in backquotes."""
     return {word for quoted in re.findall(r"`([^`]+)`", text) for word in re.split(r"[\s,:.\[\]{}\"]+", quoted) if word}
 
 
@@ -76,7 +76,7 @@ def examples(text):
 
 
 class Document:
-    """docs/user/northbound.md beside the description: what disagrees, as sentences."""
+    """Compares docs/user/northbound.md with the description; yields each difference as a sentence."""
 
     def __init__(self, description):
         self.description = description
@@ -116,20 +116,20 @@ class Document:
                 refusal = self.description.objects["refusal"]["fields"]
                 yield from self.description.complaints(body, refusal, f"example of a refusal of {cmd}")
         yield from self.ranges(cmd, part)
-        if cmd != "status":  # Its fields have tables of their own.
-            yield from (f"{DOCUMENT}: {cmd} does not speak of {name}" for name in {**wanted, **replied} if name not in shown)
+        if cmd != "status":  # Its fields have separate tables.
+            yield from (f"{DOCUMENT}: {cmd} does not mention {name}" for name in {**wanted, **replied} if name not in shown)
 
     def limits(self):
-        """Numbers that hold for all requests and replies, before the first of them."""
+        """Limits of all requests and replies, before the first of them."""
         text = " ".join(self.text.split("## Requests")[0].split())
         limits = self.description.limits
-        told = {
+        documented = {
             "request_bytes": f"A request has at most {limits['request_bytes']} bytes",
             "line_bytes": f"a reply or event at most {limits['line_bytes']}",
             "id_text_bytes": f"a string of up to {limits['id_text_bytes']} bytes",
             "depth": f"nested at most {limits['depth']} deep",
         }
-        yield from (f"{DOCUMENT}: the limit {name} is not told as {words!r}" for name, words in told.items() if words not in text)
+        yield from (f"{DOCUMENT}: the limit {name} is not documented as {words!r}" for name, words in documented.items() if words not in text)
 
     def ranges(self, cmd, part):
         """Lengths, ranges and defaults of a request's fields."""
@@ -138,7 +138,7 @@ class Document:
             wanted = [f"up to {field['bytes']} bytes"] if "bytes" in field else []
             wanted += [f"{field['least']}..{field['most']}"] if "most" in field else []
             wanted += [f"default {field['default']}"] if "default" in field else []
-            yield from (f"{DOCUMENT}: {name} of {cmd} is not told as {words!r}" for words in wanted if words not in text)
+            yield from (f"{DOCUMENT}: {name} of {cmd} is not documented as {words!r}" for words in wanted if words not in text)
 
     def events(self):
         text = section(self.text, "## Events")
@@ -155,7 +155,7 @@ class Document:
 
     def event(self, name, event, topic, shown):
         if topic != (event["topic"] or "any"):
-            yield f"{DOCUMENT}: {name} is of the topic {topic}, not of {event['topic']}"
+            yield f"{DOCUMENT}: {name} has the topic {topic}, not {event['topic']}"
         known = {"rate_hz", *self.description.events, *self.description.requests}
         for key, field in self.description.event(name).items():
             nested = self.nested(field)
@@ -165,7 +165,7 @@ class Document:
         yield from (f"{DOCUMENT}: event {name}: what is {word}?" for word in sorted(shown - known))
 
     def nested(self, field):
-        """What a row of a table must name beside the field: fields of its object, or its words."""
+        """The words that a row of a table must name besides the field: fields of its object, or its words."""
         kind = field["type"] if isinstance(field["type"], str) else field["type"][-1]
         if kind in self.description.objects and kind != "wheel_status":
             inner = self.description.fields(self.description.objects[kind])
@@ -173,7 +173,7 @@ class Document:
         return self.words_in_place(kind)
 
     def words_in_place(self, kind):
-        """Words that have no table of their own."""
+        """Words without a separate table."""
         told_elsewhere = ("cause", "error", "provenance", "force_validity", "side")
         return set(self.description.words[kind]) if kind in self.description.words and kind not in told_elsewhere else set()
 
@@ -194,42 +194,42 @@ class Document:
             yield from (f"{DOCUMENT}: {kind} lacks {word}" for word in self.description.words[kind] if word not in shown)
 
     def errors(self):
-        told = {name.strip("`"): means.replace("`", "") for name, means, _ in rows(section(self.text, "## Errors"))[1:]}
-        yield from differences("errors", set(told), set(self.description.words["error"]))
+        documented = {name.strip("`"): means.replace("`", "") for name, means, _ in rows(section(self.text, "## Errors"))[1:]}
+        yield from differences("errors", set(documented), set(self.description.words["error"]))
         for name, means in self.description.raw["errors"].items():
-            if told.get(name, means) != means:
-                yield f"{DOCUMENT}: {name} is {told[name]!r}, in share/northbound.json {means!r}"
+            if documented.get(name, means) != means:
+                yield f"{DOCUMENT}: {name} is {documented[name]!r}, in share/northbound.json {means!r}"
 
     def causes(self):
-        told = {}
+        documented = {}
         for names, latches, _ in rows(section(self.text, "## Causes"))[1:]:
-            told.update(dict.fromkeys(tokens(names), latches))
-        yield from differences("causes", set(told), set(self.description.words["cause"]))
+            documented.update(dict.fromkeys(tokens(names), latches))
+        yield from differences("causes", set(documented), set(self.description.words["cause"]))
         for name, cause in self.description.raw["causes"].items():
-            if told.get(name, cause["latches"]) != cause["latches"]:
-                yield f"{DOCUMENT}: {name} latches {told[name]}, in share/northbound.json {cause['latches']}"
+            if documented.get(name, cause["latches"]) != cause["latches"]:
+                yield f"{DOCUMENT}: {name} latches {documented[name]}, in share/northbound.json {cause['latches']}"
 
 
-def differences(what, told, wanted):
-    yield from (f"{DOCUMENT}: {what}: {name} is not in share/northbound.json" for name in sorted(told - wanted))
-    yield from (f"{DOCUMENT}: {what}: {name} is missing" for name in sorted(wanted - told))
+def differences(what, documented, wanted):
+    yield from (f"{DOCUMENT}: {what}: {name} is not in share/northbound.json" for name in sorted(documented - wanted))
+    yield from (f"{DOCUMENT}: {what}: {name} is missing" for name in sorted(wanted - documented))
 
 
 def gateway_words(description):
-    """What words a source of ours knows and the description does not, or the other way round."""
+    """Words that a C source knows and the description does not, and the reverse."""
     for kind, sources in SOURCES.items():
         known, wanted = {}, set(description.words[kind])
         for path, function, others in sources if isinstance(sources, list) else [sources]:
             match = re.search(rf"^(?:const char \*|static void ){function}\(.*?^}}", read(path), re.MULTILINE | re.DOTALL)
             if match is None:
-                yield f"{path}: {function} is not there; scripts/northbound.py must know where the words of {kind} are now"
+                yield f"{path}: {function} is missing; update SOURCES with the function that has the words of {kind}"
             known.update(dict.fromkeys(set(re.findall(r'"([^"]*)"', match[0] if match else "")) - others, path))
         yield from (f"share/northbound.json: {kind} lacks {word}, which {known[word]} has" for word in sorted(known.keys() - wanted))
         yield from (f"share/northbound.json: {kind} has {word}, which {path} has not" for word in sorted(wanted - known.keys()))
 
 
 def c_limits(description):
-    """Numbers and orders that a header has and the description does not, or the other way round."""
+    """Numbers and orders that a header has and the description does not, and the reverse."""
     path = "lib/northbound/protocol/include/iwheel_northbound/{}.h"
     limits, watch = description.limits, description.fields(description.requests["watch"])
     wanted = {

@@ -8,9 +8,9 @@
 #define MS         1000U
 #define LENGTH     6U
 #define EXIT_USAGE 64
-/// What the last letter leads to is watched for this long.
+/// Time for which the consequences of the last letter are judged.
 #define TAIL_US (250U * MS)
-/// From letter to letter. Each of `uniform` alone; by number, spacings mixed differently in every sequence.
+/// Time between two letters: one of `uniform`, or by number a mix of spacings that differs in every sequence.
 #define UNIFORM 6U
 static const uint32_t uniform_us[UNIFORM] = {0, 300, 3 * MS, 60 * MS, 260 * MS, 900 * MS};
 static const uint32_t mixed_us[] = {0,        90,       1 * MS,   9 * MS,    47 * MS,  130 * MS,
@@ -24,7 +24,8 @@ typedef enum { START_REST = 0, START_DRIVING, STARTS } start_t;
 typedef struct {
     start_t start;
     world_mode_t mode;
-    unsigned spacing; ///< Below UNIFORM: that one. From there on: mixed, and in every third of these drives come late.
+    unsigned
+        spacing; ///< Below UNIFORM: that spacing. From UNIFORM on: mixed; in every third of these, drives come late.
     unsigned length;
 } combination_t;
 
@@ -36,18 +37,20 @@ static const char *const start_names[STARTS] = {"rest", "driving"};
 static const char *const mode_names[MODES] = {"once", "stream", "blind"};
 
 static void usage(FILE *out) {
-    fputs("usage: test_orders [--full] [--length N] [--part I/N]\n"
-          "       test_orders --sequence rest|driving once|stream|blind SPACING LETTER,LETTER,...\n"
-          "Plays every sequence of press, release, reset, arm, command, kill, restart and bus (down or up), with "
-          "several\n"
-          "spacings, from standing and from driving wheels, with after_stop = hold and without, with drives that come "
-          "at once or have waited, and judges\n"
-          "each by the rules of motion permission.\n"
-          "--length: of the sequences, 6 if not told; --part 0/2 and 1/2 are the halves; --full: more spacings.\n"
-          "--sequence plays one and tells what happens; SPACING is the number that a failure told. A failing sequence "
-          "is\n"
-          "made small first. The last line is `N passed, N failed, N skipped`.\n",
-          out);
+    fputs(
+        "usage: test_orders [--full] [--length N] [--part I/N]\n"
+        "       test_orders --sequence rest|driving once|stream|blind SPACING LETTER,LETTER,...\n"
+        "Plays every sequence of press, release, reset, arm, command, kill, restart and bus (down or up), with "
+        "several\n"
+        "spacings, from wheels at standstill and from driving wheels, with after_stop = hold and without, with drives "
+        "that come "
+        "immediately or have waited, and judges\n"
+        "each by the rules of motion permission.\n"
+        "--length: of the sequences, default 6; --part 0/2 and 1/2 are the halves; --full: more spacings.\n"
+        "--sequence plays one and prints its events; SPACING is the number printed with a failure. A failing sequence "
+        "is\n"
+        "made small first. The last line is `N passed, N failed, N skipped`.\n",
+        out);
 }
 
 static uint32_t hash(uint32_t value) {
@@ -56,7 +59,7 @@ static uint32_t hash(uint32_t value) {
     return value ^ (value >> 16);
 }
 
-/// How long after this letter the next one comes.
+/// Returns the time from this letter to the next one.
 static uint32_t spacing_us(const combination_t *combination, const uint8_t *letters, unsigned count) {
     uint32_t seed = combination->spacing;
     if (combination->spacing < UNIFORM) {
@@ -68,7 +71,7 @@ static uint32_t spacing_us(const combination_t *combination, const uint8_t *lett
     return mixed_us[seed % MIXED];
 }
 
-/// Standing wheels that are known to stand; or driving ones, driven by a client that goes on as its mode says.
+/// Begins with wheels known to be at standstill, or with wheels driven by a client that continues according to its mode.
 static void begin(world_t *world, const combination_t *combination, world_stats_t *stats) {
     world_init(world, combination->mode, combination->spacing % 2U == 1U, stats);
     world_run(world, 350U * MS);
@@ -91,7 +94,7 @@ typedef struct {
     uint64_t sequences;
 } play_t;
 
-/// Every continuation; false as soon as one breaks a rule, which then stands in `letters`, `*count` long.
+/// Plays every continuation. Returns false at the first that breaks a rule; it is then in `letters`, with length `*count`.
 static bool play_all(play_t *play, unsigned *count) {
     static world_t saved[LENGTH];
     const unsigned depth = *count;
@@ -130,7 +133,7 @@ static bool breaks(world_t *world, const combination_t *combination, const uint8
     return world_broken(world);
 }
 
-/// Leaves out letters as long as something stays broken.
+/// Removes letters as long as a rule stays broken.
 static unsigned shrink(world_t *world, const combination_t *combination, uint8_t *letters, unsigned count) {
     for (unsigned i = 0; i < count;) {
         uint8_t fewer[LENGTH];
@@ -163,12 +166,12 @@ static void tell_failure(play_t *play, unsigned count) {
     printf("rule %u at %.3f ms: %s\n", world->oracle.rule, (double)world->oracle.broken_us / 1e3, world->oracle.text);
 }
 
-/// What did not happen at all in a complete enumeration makes it worthless.
+/// Returns true if everything happened that must happen in a complete enumeration; otherwise it proves nothing.
 static bool happened(const world_stats_t *stats, const combination_t *combination) {
     const bool drove = combination->start == START_DRIVING ||
                        (stats->armed > 0U && stats->drives > 0U && stats->nonzero > 0U) ||
-                       combination->spacing < 2U; // Nothing can be armed that fast.
-    const bool enough = combination->length > 3U; // To arm, and to be late in both ways.
+                       combination->spacing < 2U; // Arming takes longer than these spacings.
+    const bool enough = combination->length > 3U; // Long enough to arm and to be late in both ways.
     const bool waited = !is_late(combination) || !enough || (stats->aged > 0U && stats->stale > 0U);
     return drove && waited && stats->restarts > 0U && stats->latched > 0U;
 }

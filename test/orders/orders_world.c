@@ -11,15 +11,15 @@
 #define TELEMETRY_US (40U * MS)
 #define STREAM_US    (50U * MS)
 #define FRAME_US     120U
-#define RESTART_US   100U ///< Sooner than any real one: what the dead process sent is still on its way.
-#define RULE_CUT     911U ///< Of our own.
-#define RULE_FULL    912U ///< The world itself is at its end.
+#define RESTART_US   100U ///< Faster than any real restart: frames of the dead process are still in flight.
+#define RULE_CUT     911U ///< The simpler rule.
+#define RULE_FULL    912U ///< The world has no space left.
 #define PERIOD_MS    40U
 #define SILENT_MS    200U
 #define LEASE_MS     200U
 #define LEFT_mm_s    400
 #define RIGHT_mm_s   300
-/// The wheels' own: they follow at this pace, and coast at that one when they were told nothing for a second.
+/// Slopes of the wheels: they follow a command at the first, and coast at the second after a second without a command.
 #define FOLLOW_UM_S_PER_MS 4000
 #define COAST_UM_S_PER_MS  700
 #define UM_S_PER_RPM       20106
@@ -35,7 +35,7 @@ static int32_t speed_of(const iw_can_frame_t *frame) {
 }
 
 static bool send_one(world_t *self, const iw_can_frame_t *frame) {
-    const bool taken = self->flights < WORLD_FLIGHT && !self->down;
+    const bool accepted = self->flights < WORLD_FLIGHT && !self->down;
     self->stats->frames++;
     self->stats->nonzero += (speed_of(frame) != 0) ? 1U : 0U;
     if (self->traces) {
@@ -43,16 +43,16 @@ static bool send_one(world_t *self, const iw_can_frame_t *frame) {
                speed_of(frame));
     }
     if (self->cut && speed_of(frame) != 0) {
-        oracle_fail(&self->oracle, self->now_us, RULE_CUT, "motion that nobody has asked for since it was cut");
+        oracle_fail(&self->oracle, self->now_us, RULE_CUT, "motion without a new request after a cut");
     }
-    if (taken) {
+    if (accepted) {
         world_flight_t *const flight = &self->flight[self->flights];
         const iw_time_us_t free_us = (self->flights > 0U) ? flight[-1].done_us : self->now_us;
         *flight = (world_flight_t){*frame, self->now_us, free_us + FRAME_US, true};
         self->flights++;
     }
-    oracle_sent(&self->oracle, self->now_us, frame, taken);
-    return taken;
+    oracle_sent(&self->oracle, self->now_us, frame, accepted);
+    return accepted;
 }
 
 static int world_send(void *context, const iw_can_frame_t *frames, uint32_t count) {
@@ -166,13 +166,13 @@ void world_init(world_t *self, world_mode_t mode, bool hold, world_stats_t *stat
 
 // ---- requests ----------------------------------------------------------------------------------------------------
 
-static void tell(const world_t *self, const char *what, int result) {
+static void trace(const world_t *self, const char *what, int result) {
     if (self->traces) {
         printf("  %9.3f ms    %s: %s\n", (double)self->now_us / 1e3, what, (result == 0) ? "accepted" : "refused");
     }
 }
 
-/// When the drive that comes now was sent: a time that depends on nothing but now, so that every replay is the same.
+/// Returns when the current drive was sent: a time that depends only on the current time, so every replay is the same.
 static iw_time_us_t sent_us(const world_t *self) {
     static const uint32_t ages_us[] = {0, 1 * MS, LEASE_MS * MS / 2U, LEASE_MS * MS - 1U, LEASE_MS * MS, 520 * MS};
     const iw_time_us_t armed_us = self->gateway.permit.armed_us;
@@ -183,12 +183,12 @@ static iw_time_us_t sent_us(const world_t *self) {
     if (choice < sizeof ages_us / sizeof ages_us[0]) {
         return self->now_us - ages_us[choice];
     }
-    // The first moment that may count, and the last one that must not.
+    // The first time that may count, and the last one that must not.
     return (armed_us > START_US && armed_us <= self->now_us) ? armed_us - (choice & 1U) : self->now_us;
 }
 
 static bool drive(world_t *self) {
-    // A limit that is too low on the left, and lower than the maximum on both.
+    // The left limit is too low, and both are lower than the maximum.
     const iw_drive_t request = {{LEFT_mm_s, RIGHT_mm_s}, {0, 1200}, true};
     const oracle_asked_t asked = {self->now_us, sent_us(self), self->client};
     const bool aged = asked.sent_us < self->now_us;
@@ -197,7 +197,7 @@ static bool drive(world_t *self) {
     if (self->traces && aged) {
         printf("  %9.3f ms    sent at %.3f ms\n", (double)self->now_us / 1e3, (double)asked.sent_us / 1e3);
     }
-    tell(self, "drive", (int)result);
+    trace(self, "drive", (int)result);
     oracle_drive(&self->oracle, &asked, &request, result, &applied);
     if (result == IW_REFUSE_NONE) {
         self->stats->drives++;
@@ -210,14 +210,14 @@ static bool drive(world_t *self) {
 }
 
 static void command(world_t *self) {
-    const bool taken = drive(self);
-    const bool goes_on = self->mode == MODE_BLIND || (self->mode == MODE_STREAM && taken);
+    const bool accepted = drive(self);
+    const bool goes_on = self->mode == MODE_BLIND || (self->mode == MODE_STREAM && accepted);
     self->drive_us = goes_on ? self->now_us + STREAM_US : IW_NEVER;
 }
 
 static void arm(world_t *self) {
     const iw_refusal_t result = iw_gateway_arm(&self->gateway, self->now_us, self->client, false);
-    tell(self, "arm", (int)result);
+    trace(self, "arm", (int)result);
     oracle_arm(&self->oracle, self->now_us, self->client, false, result);
     if (result == IW_REFUSE_NONE && !self->arm_after_cut) {
         self->arm_after_cut = true;
@@ -230,7 +230,7 @@ static void reset(world_t *self) {
     const iw_state_t before = iw_gateway_state(&self->gateway);
     const iw_stop_t stop = self->gateway.permit.stop;
     const iw_refusal_t result = iw_gateway_reset(&self->gateway, self->now_us);
-    tell(self, "reset", (int)result);
+    trace(self, "reset", (int)result);
     oracle_reset(&self->oracle, self->now_us, before, &stop);
     if (before == IW_STATE_LATCHED && result == IW_REFUSE_NONE) {
         self->stats->resets++;
@@ -239,10 +239,10 @@ static void reset(world_t *self) {
     wake(self);
 }
 
-/// Of a button that is released already it is the request: the end of a hold.
+/// If the button is already released, this letter is the request that ends a hold.
 static void release_hold(world_t *self) {
     const iw_refusal_t result = iw_gateway_release(&self->gateway);
-    tell(self, "release of the hold", (int)result);
+    trace(self, "release of the hold", (int)result);
     oracle_release(&self->oracle, self->now_us, result);
     wake(self);
 }
@@ -271,9 +271,9 @@ static void kill_client(world_t *self) {
     wake(self);
 }
 
-/// What the dead process had handed over is still on its way, and a stranger's to the new one.
+/// Frames that the dead process sent are still in flight, and are foreign frames for the new process.
 static void restart(world_t *self) {
-    const bool silent = !iw_gateway_is_sending(&self->gateway);
+    const bool idle = !iw_gateway_is_sending(&self->gateway);
     for (uint32_t i = 0; i < self->flights; i++) {
         self->flight[i].own = false;
     }
@@ -285,7 +285,7 @@ static void restart(world_t *self) {
     self->received = 0;
     self->stats->restarts++;
     cut(self);
-    start_gateway(self, !silent);
+    start_gateway(self, !idle);
 }
 
 static void toggle_bus(world_t *self) {
@@ -354,9 +354,9 @@ static void put(world_t *self, const iw_can_frame_t *frame, uint8_t kind) {
 
 static void move_wheel(world_wheel_t *wheel, iw_time_us_t now_us) {
     const int64_t span_us = (int64_t)(now_us - wheel->moved_us);
-    const bool told = wheel->received_us != IW_NEVER && now_us - wheel->received_us < IW_WHEEL_WATCHDOG_US;
-    const int64_t pace = (told ? FOLLOW_UM_S_PER_MS : COAST_UM_S_PER_MS) * span_us / MS;
-    const int64_t way = (told ? (int64_t)wheel->commanded_mm_s * 1000 : 0) - wheel->speed_um_s;
+    const bool commanded = wheel->received_us != IW_NEVER && now_us - wheel->received_us < IW_WHEEL_WATCHDOG_US;
+    const int64_t pace = (commanded ? FOLLOW_UM_S_PER_MS : COAST_UM_S_PER_MS) * span_us / MS;
+    const int64_t way = (commanded ? (int64_t)wheel->commanded_mm_s * 1000 : 0) - wheel->speed_um_s;
     const int64_t capped = (way > pace) ? pace : ((way < -pace) ? -pace : way);
     wheel->speed_um_s += (int32_t)capped;
     wheel->moved_us = now_us;

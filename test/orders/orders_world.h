@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-/// A gateway with two obedient wheels, a client, a button and a bus, small enough to be copied and put back: what the
-/// enumeration of all orders of events plays on. Judged by the oracle of the simulation, and by a second, simpler rule
-/// of its own: after a cut nothing but zero leaves until arm and then a drive were accepted.
+/// A gateway with two obedient wheels, a client, a button and a bus, small enough to be copied and restored: the world of
+/// the enumeration of all orders of events. The oracle of the simulation judges it, and so does a second, simpler rule:
+/// after a cut only zero is sent until an arm and then a drive were accepted.
 #ifndef ORDERS_WORLD_H
 #define ORDERS_WORLD_H
 
@@ -10,28 +10,28 @@
 #define WORLD_FLIGHT 8U
 #define WORLD_RX     64U
 
-/// The alphabet.
+/// The letters of a sequence.
 typedef enum {
     STEP_PRESS = 0,
-    STEP_RELEASE, ///< Of the button; if it is not pressed, of the hold.
+    STEP_RELEASE, ///< Releases the button; if it is not pressed, the hold.
     STEP_RESET,
     STEP_ARM,
     STEP_COMMAND,
-    STEP_KILL,    ///< The client's connection ends; another one comes.
+    STEP_KILL,    ///< The client's connection ends and another client connects.
     STEP_RESTART, ///< The gateway's process dies and runs again.
     STEP_BUS,     ///< The bus goes down, or up again.
     STEP_KINDS,
 } world_step_t;
 
-/// What a command is.
+/// The client's reaction after a command.
 typedef enum {
     MODE_ONCE = 0, ///< One drive.
     MODE_STREAM,   ///< A drive every 50 ms until one is refused.
-    MODE_BLIND,    ///< A drive every 50 ms, whatever the answers, until the client is killed.
+    MODE_BLIND,    ///< A drive every 50 ms, whatever the replies, until the client is killed.
     MODES,
 } world_mode_t;
 
-/// What all the sequences consisted of; not put back.
+/// Sums over all sequences; not restored.
 typedef struct {
     uint64_t steps, frames, nonzero, armed, drives, resets, latched, restarts, stops;
     uint64_t aged, stale; ///< Drives that had waited: accepted; refused because they were sent before the arm.
@@ -41,7 +41,7 @@ typedef struct {
     iw_can_frame_t frame;
     iw_time_us_t handed_us;
     iw_time_us_t done_us;
-    bool own; ///< Sent by the process that runs now.
+    bool own; ///< Sent by the current process.
 } world_flight_t;
 
 typedef struct {
@@ -64,22 +64,22 @@ typedef struct {
     world_mode_t mode;
     bool pressed, edge, down, lost, traces;
     bool hold;               ///< after_stop = hold.
-    bool late;               ///< Drives have waited somewhere on their way, each for another time.
-    bool cut, arm_after_cut; ///< The simpler rule's memory, and since when the latter.
+    bool late;               ///< Drives were delayed on their way, each by another time.
+    bool cut, arm_after_cut; ///< State of the simpler rule; `arm_us` is the time of the arm.
     iw_time_us_t arm_us;
     iw_state_t state;
 } world_t;
 
-/// The gateway starts in front of standing wheels, with after_stop = hold or without. There is one world at a time: it must not be moved.
+/// Starts a gateway with wheels at standstill, with after_stop = hold or without. There is one world at a time: it must not be moved.
 void world_init(world_t *self, world_mode_t mode, bool hold, world_stats_t *stats);
 
-/// Does what the letter says, now.
+/// Executes the letter now.
 void world_do(world_t *self, world_step_t step);
 
 /// Lets time pass.
 void world_run(world_t *self, iw_time_us_t for_us);
 
-/// A rule is broken, and which.
+/// Returns true if a rule is broken.
 bool world_broken(const world_t *self);
 
 const char *world_step_name(unsigned step);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A C++ program can use the client: moved, left early, and closed by the end of its scope.
+// A C++ program uses the client: it moves the connection, leaves early on an error, and closes the connection at the end of a scope.
 #include <iwheel_client/client.hpp>
 
 #include <cstdio>

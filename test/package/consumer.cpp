@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A C++ program can use the core.
+// A C++ program uses the core.
 #include "iwheel/iwheel.hpp"
 
 #include <cstdio>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The table of docs/user/deploy.md: what controllers of Linux boards make of 1 Mbit/s and 62.5 %. test/package/run compares.
+// Prints the table of docs/user/deploy.md: the sample points that the controllers of Linux boards can set for 1 Mbit/s and 62.5 %.
+// test/package/run compares it with that file.
 #include "iwheel/bit_timing.h"
 
 #include <stdio.h>

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-// Row 31: one wheel does something else. How far does the machine turn from its commanded path until it stands?
+// Row 31: one wheel deviates from its command. How far does the machine turn from its commanded path until it is at standstill?
 #include "faults.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 
-/// Until everything stands: a wheel that coasts from 1000 mm/s takes 1.4 s.
+/// Everything is at standstill after this time: a wheel that coasts from 1000 mm/s takes 1.4 s.
 #define STAND_MS 6000U
 
 typedef enum { BLOCKED, SLOW, FREE, REVERSED, LATE } kind_t;
@@ -13,8 +13,8 @@ typedef enum { BLOCKED, SLOW, FREE, REVERSED, LATE } kind_t;
 typedef struct {
     const char *name;
     kind_t kind;
-    int32_t by;           ///< Percent of its command that is left; ms that it is late.
-    int64_t limit_deg[2]; ///< Up to 800 mm/s, and at 1000.
+    int32_t by;           ///< SLOW: speed in percent of the command. LATE: delay in ms.
+    int64_t limit_deg[2]; ///< Limits up to 800 mm/s and at 1000 mm/s.
 } fault_t;
 
 static const fault_t faults[] = {
@@ -55,7 +55,7 @@ static void fail_wheel(const fault_t *fault) {
     }
 }
 
-/// Both machines alike up to here: then one of them has the fault, the other does as the first one was commanded.
+/// Drives one machine up to the moment of the fault; the caller then copies it.
 static void begin(situation_t situation, int32_t speed_mm_s, uint16_t pair_mm) {
     sim_pair_config_t pair;
     iw_config_t config;
@@ -71,7 +71,7 @@ static void begin(situation_t situation, int32_t speed_mm_s, uint16_t pair_mm) {
     }
 }
 
-/// A sound pair that is sent what the first one is: its path is the commanded one.
+/// Sends the setpoints of the faulty machine to the sound one: the path of the sound one is the commanded path.
 static void follow_setpoints(const iw_pair_t *applied) {
     for (unsigned side = 0; side < IW_SIDES; side++) {
         const iw_codec_setpoint_t setpoint = {applied->wheel[side].speed_mm_s, applied->wheel[side].current_mA, 1U};
@@ -80,7 +80,7 @@ static void follow_setpoints(const iw_pair_t *applied) {
     sound.now_us = machine.now_us;
 }
 
-/// Thousandths of a degree between both, at the most.
+/// The largest angle between both machines, in thousandths of a degree.
 static int64_t turn_mdeg(const fault_t *fault, situation_t situation, int32_t speed_mm_s, uint16_t pair_mm) {
     int64_t largest = 0;
     begin(situation, speed_mm_s, pair_mm);
@@ -96,7 +96,7 @@ static int64_t turn_mdeg(const fault_t *fault, situation_t situation, int32_t sp
     return largest;
 }
 
-/// A steady difference that leaks as fast as it comes is never noticed: docs/user/pair.md has its degrees a second.
+/// A difference that leaks as fast as it adds up is below the detection limit: docs/user/pair.md gives its degrees per second.
 static bool is_unnoticed(const fault_t *fault, int32_t speed_mm_s) {
     const iw_config_t *const config = &machine.gateway.config;
     const int32_t ordinary_mm_s = speed_mm_s * IW_DIVERGE_DROOP_PERCENT / 100 + 10;
@@ -122,12 +122,12 @@ static bool play_row(const fault_t *fault, situation_t situation, uint16_t pair_
     return good;
 }
 
-/// One wheel offline: what it does meanwhile nobody knows.
+/// One wheel is offline: nobody knows what it does meanwhile.
 typedef enum { OBEYS, COASTS, BRAKES, OFFLINES } offline_t;
 static const char *const offlines[OFFLINES] = {"obeys", "coasts", "brakes"};
-/// No more than this, whatever it does.
+/// The machine must not turn by more than this, whatever the wheel does.
 #define OFFLINE_LIMIT_MDEG 40000
-/// Deceleration counts over this long: what a person feels, not what the current does.
+/// The deceleration is averaged over this time, as a person feels it: short steps of the motor current do not count.
 #define FELT_MS 20U
 
 typedef struct {
@@ -149,8 +149,8 @@ static int32_t middle_mm_s(void) {
            2;
 }
 
-/// `at_once`: not what the core does, but what it would be if it sent zero at once.
-static felt_t offline(offline_t what, bool at_once) {
+/// `immediate`: does not use the core's ramp; the stop sends zero immediately, for comparison.
+static felt_t offline(offline_t what, bool immediate) {
     felt_t felt = {0, 0};
     int32_t before_mm_s = 0;
     begin(STRAIGHT, 1000, 0);
@@ -158,7 +158,7 @@ static felt_t offline(offline_t what, bool at_once) {
     go_offline(what);
     for (uint32_t ms = 0; ms < STAND_MS; ms += FELT_MS) {
         machine_run(&machine, FELT_MS);
-        if (at_once && iw_gateway_state(&machine.gateway) == IW_STATE_LATCHED) {
+        if (immediate && iw_gateway_state(&machine.gateway) == IW_STATE_LATCHED) {
             iw_gateway_estop(&machine.gateway, machine.now_us, DRIVER);
         }
         const int64_t away = llabs(machine_heading_mdeg(&machine));
@@ -172,12 +172,13 @@ static felt_t offline(offline_t what, bool at_once) {
 
 static bool play_offline(void) {
     int64_t worst[2] = {0, 0};
-    printf("\n| left wheel offline at 1000 mm/s, and | ramp | zero at once |\n|---|---|---|\n");
+    printf("\n| left wheel offline at 1000 mm/s, and it | ramp | immediate zero |\n|---|---|---|\n");
     for (unsigned what = 0; what < OFFLINES; what++) {
         felt_t felt[2];
-        for (unsigned at_once = 0; at_once < 2U; at_once++) {
-            felt[at_once] = offline((offline_t)what, at_once != 0U);
-            worst[at_once] = (felt[at_once].turn_mdeg > worst[at_once]) ? felt[at_once].turn_mdeg : worst[at_once];
+        for (unsigned immediate = 0; immediate < 2U; immediate++) {
+            felt[immediate] = offline((offline_t)what, immediate != 0U);
+            worst[immediate] =
+                (felt[immediate].turn_mdeg > worst[immediate]) ? felt[immediate].turn_mdeg : worst[immediate];
         }
         printf("| %s | %.1f degrees, %d mm/s2 | %.1f degrees, %d mm/s2 |\n", offlines[what],
                (double)felt[0].turn_mdeg / 1000.0, felt[0].peak_mm_s2, (double)felt[1].turn_mdeg / 1000.0,

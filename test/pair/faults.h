@@ -4,7 +4,8 @@
 
 #include "drive.h"
 
-/// Plays each fault of one wheel at each speed, straight, in a curve, in a ramp and in a stop, and tells the angle as a table. An exit status.
+/// Plays each fault of one wheel at each speed: straight ahead, in a curve, in a ramp and in a stop. Prints the angles as a table. Returns an
+/// exit status.
 int faults_play(uint16_t pair_mm);
 
 #endif

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// How close does an ordinary machine come to pair_mm? Drives for hours within the ranges of what is ordinary; no stop may come.
+// How close does an ordinary machine come to pair_mm? Drives for hours within the ranges of an ordinary machine; nothing may stop it.
 #include "faults.h"
 
 #include <stdio.h>
@@ -20,7 +20,7 @@ typedef struct {
 
 static machine_t machine;
 
-/// What all machines came to.
+/// The results of all machines.
 static struct {
     double hours;
     uint64_t machines;
@@ -52,7 +52,7 @@ static void any_command(sim_random_t *random) {
     }
 }
 
-static void tell_stop(uint64_t seed) {
+static void print_stop(uint64_t seed) {
     const iw_stop_t *const stop = &machine.gateway.permit.stop;
     printf("FAILED seed %llu: a false stop, cause %u, sides %u, %u, at %d %d mm/s\n", (unsigned long long)seed,
            stop->cause, stop->sides, stop->detail, stop->applied.wheel[IW_LEFT].speed_mm_s,
@@ -68,7 +68,7 @@ static void note_largest(uint64_t seed) {
     }
 }
 
-/// Where nobody drives nothing holds a wheel on a slope: it would roll away before it can be armed.
+/// Removes the slope: nothing holds an undriven wheel on it, so the wheel would roll away before it can be armed.
 static void level(void) {
     for (size_t side = 0; side < IW_SIDES; side++) {
         sim_motion_advance(&machine.pair.wheel[side].motion, machine.now_us);
@@ -84,7 +84,7 @@ static void maybe_kerb(sim_random_t *random) {
     }
 }
 
-/// One drive: some commands, each held for a while, kerbs in between; then the lease is lost. False: it was stopped.
+/// One drive: some commands for a while each, with kerbs in between; then the client loses its lease. Returns false if something stopped it.
 static bool drive_once(uint64_t seed, sim_random_t *random) {
     const uint32_t commands = 3U + sim_random_below(random, 10U);
     level();
@@ -100,11 +100,11 @@ static bool drive_once(uint64_t seed, sim_random_t *random) {
         machine_run(&machine, 500U);
         note_largest(seed);
         if (iw_gateway_state(&machine.gateway) != IW_STATE_ARMED) {
-            tell_stop(seed);
+            print_stop(seed);
             return false;
         }
     }
-    machine.drive_us = IW_NEVER; // The client is gone: the lease is lost, and the ramp must not diverge either.
+    machine.drive_us = IW_NEVER; // The client has gone and its lease ends: the pair rule must not stop the ramp either.
     machine_run(&machine, 1500U);
     note_largest(seed);
     sum.drives++;
@@ -148,11 +148,10 @@ static int drive_ranges(const options_t *options) {
 
 static void usage(FILE *out) {
     fputs("usage: test_pair [--hours H] [--first SEED] [--pair-mm N] | --faults [--pair-mm N]\n"
-          "Drives machines of any kind within the ranges of what is ordinary (test/support/sim_ranges.h) for that many "
-          "simulated hours (1); none of\n"
-          "them may be stopped. Tells the largest deviation. --faults: the angle of each fault of one wheel, as a "
-          "table, and whether it is\n"
-          "within its limit. The last line is `N passed, N failed, N skipped`.\n",
+          "Drives different machines within the ranges of an ordinary machine (test/support/sim_ranges.h) for H\n"
+          "simulated hours (1); nothing may stop them. Prints the largest deviation. --faults: prints the angle of\n"
+          "each fault of one wheel as a table, and checks its limit.\n"
+          "The last line is `N passed, N failed, N skipped`.\n",
           out);
 }
 

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: MIT
-"""The core does the same on other machines, with other compilers, however it is optimised.
+"""The core behaves identically on other machines, with other compilers and with any optimisation.
 
-  native   this machine: the measure for the others
+  native   this machine: the reference for the others
   aarch64  64 bits, unsigned char
   armhf    32 bits, unsigned char
   s390x    64 bits, big-endian
 
-On each machine the simulation (test/sim) plays the same seeds, compiled by gcc and by clang, with -O0 and with -Os: the hash of every byte
-sent and every answer given must be the same. On each machine but this one the core's unit tests pass too. Cortex-M0+, M3 and M4 are
-left to test/target and test/sim/run --arm. Foreign machines are emulated by qemu-user. -k MACHINE: one only.
+On each machine the simulation (test/sim) plays the same seeds, compiled by gcc and by clang, with -O0 and with -Os: the hash of all bytes
+sent and all answers must be identical. On each machine but this one the core's unit tests must pass too. test/target and
+test/sim/run --arm cover Cortex-M0+, M3 and M4. qemu-user emulates the foreign machines. -k MACHINE: only this machine.
 """
 
 import fcntl
@@ -28,9 +28,9 @@ WORK = ROOT / "build/portability"
 MACHINES = {"native": (None, None), "aarch64": ("aarch64-linux-gnu", "aarch64"), "armhf": ("arm-linux-gnueabihf", "arm"), "s390x": ("s390x-linux-gnu", "s390x")}
 SEED_FIRST, SEED_COUNT = 1, 8
 FULL = os.environ.get("IWHEEL_FULL") == "1"
-SLOW = ("gateway_core_walk", "bit_timing", "codec_sweep", "gate_scheduler")  # Run with one of the two only.
+SLOW = ("gateway_core_walk", "bit_timing", "codec_sweep", "gate_scheduler")  # These run with gcc only.
 pytestmark = [pytest.mark.exact, pytest.mark.limit(3000)]
-TIMEOUT_S = 3000  # By the clock, of what may get little of the processor.
+TIMEOUT_S = 3000  # In real time: the process may get little processor time.
 CACHE = [shutil.which("ccache")] if shutil.which("ccache") else []
 
 
@@ -45,7 +45,7 @@ def must(command):
 
 
 class Build:
-    """The core and what judges it, for one machine, by one compiler, with one optimisation."""
+    """The core and its tests, for one machine, by one compiler, with one optimisation level."""
 
     def __init__(self, machine, compiler, level, work=WORK, core=ROOT / "core"):
         self.level, self.source = level, core
@@ -61,7 +61,7 @@ class Build:
         self.missing = [tool for tool in dict.fromkeys(tools) if shutil.which(tool) is None]
 
     def compile(self, path, *flags):
-        """The object, which several tests may share."""
+        """Returns the object file. Several tests share it."""
         out = self.folder / f"{'-'.join(path.parts[-4:])}.o"  # Several files have the same name.
         if out in self.compiled:
             return out
@@ -79,7 +79,7 @@ class Build:
         return out
 
     def hashes(self):
-        """What the simulation sent, seed by seed."""
+        """Returns the hash of each seed's simulation."""
         model = sorted((ROOT / "app/sim/model/src").glob("*.c"))
         simulation = [
             path for path in sorted((ROOT / "test/sim").glob("*.c")) if path.name not in ("main.c", "campaign.c", "directed.c", "orders.c", "orders_world.c")
@@ -91,28 +91,28 @@ class Build:
         return done.stdout.split("\n")[:-1] if done.returncode == 0 else [f"status {done.returncode}", done.stderr[-500:]]
 
     def unit_test(self, name, unity):
-        """How many single tests have passed."""
+        """Returns the number of single tests that passed."""
         flags = [f"-I{SUPPORT}", f"-I{unity}", "-DUNITY_SUPPORT_64"]
         objects = [self.compile(path, "-std=gnu11", "-w", *flags) for path in core_tests()[name]]
         common = [*self.core, self.compile(Path(unity) / "unity.c", "-w", "-DUNITY_SUPPORT_64")]
         return count_unity(run([*self.emulator, self.link(name, [*common, *objects])], timeout=TIMEOUT_S))
 
 
-def planted_core(work):
-    """A core that reads words in the order of the machine it was written on, and must be found out."""
+def seeded_core(work):
+    """Returns a core that reads words in the native byte order of the machine; the comparison must detect it."""
     core = work / "core"
     shutil.copytree(ROOT / "core", core)
     text = (core / "src/be.h").read_text()
     right = "((uint32_t)bytes[0] << 24) | ((uint32_t)bytes[1] << 16) | ((uint32_t)bytes[2] << 8) | bytes[3]"
     wrong = "__extension__({ uint32_t word; __builtin_memcpy(&word, bytes, 4); __builtin_bswap32(word); })"
-    assert right in text, f"be.h has no text {right!r} any more: mend the planted fault"
+    assert right in text, f"be.h has no text {right!r} any more: update the seeded fault"
     (core / "src/be.h").write_text(text.replace(right, wrong))
     return core
 
 
 @functools.cache
 def built(*names):
-    """One build of all tests that are together."""
+    """Returns the one build that all tests of a group share."""
     build = Build(*names)
     if build.missing:
         pytest.skip(f"{', '.join(build.missing)} missing (scripts/install_tools check brings it)")
@@ -121,7 +121,7 @@ def built(*names):
 
 @pytest.fixture(scope="module")
 def reference():
-    """The hashes of this machine; the first that needs them plays for all."""
+    """Returns the hashes of this machine; the first process that needs them calculates them for all."""
     with open(Path(tempfile.gettempdir()) / "iwheel-reference", "a+", encoding="ascii") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
         file.seek(0)
@@ -140,7 +140,7 @@ def together(several):
 
 
 def unit_tests():
-    """With two builds of each foreign machine, in ./check with four in all."""
+    """Two builds of each foreign machine; without IWHEEL_FULL four of these six."""
     for machine, compiler, level in BUILDS[4:]:
         if (compiler, level) == ("gcc", "-Os") or ((compiler, level) == ("clang", "-O0") and (FULL or machine == "s390x")):
             yield from ((machine, compiler, level, name) for name in sorted(core_tests()) if name not in SLOW or compiler == "gcc")
@@ -156,8 +156,8 @@ def test_unit(machine, compiler, level, name, record_property):
     record_property("tests", built(machine, compiler, level).unit_test(name, unity_folder()))
 
 
-def test_planted_core_that_reads_bytes_in_the_machines_own_order_is_found_out(tmp_path, reference):
-    build = Build("s390x", "gcc", "-Os", tmp_path, planted_core(tmp_path))
+def test_seeded_core_with_native_byte_order_is_detected(tmp_path, reference):
+    build = Build("s390x", "gcc", "-Os", tmp_path, seeded_core(tmp_path))
     if build.missing:
         pytest.skip(f"{', '.join(build.missing)} missing (scripts/install_tools check brings it)")
     hashes = build.hashes()

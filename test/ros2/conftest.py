@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The bridge to ROS 2: judged from the bus log, as the system tests, and by what another DDS participant hears.
+"""The bridge to ROS 2, judged from the bus log like the system tests, and by the messages that another DDS participant receives.
 
 Needs PyPI's cyclonedds and rosbags, and a build with CycloneDDS.
 """

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The node itself, without a bridge: what it opens, as the kernel reports it.
+// The node itself, without a bridge: the sockets that it opens, as the kernel reports them.
 #include "common/reach.h"
 #include "free_domain.h"
 #include "raw.h"
@@ -47,7 +47,7 @@ static void test_dds_node_on_a_network_is_reached_from_outside(void) {
 
 static dds_entity_t peer;
 
-/// A writer of requests to a service, in a participant of its own.
+/// A writer of requests to a service, in a separate participant.
 static dds_entity_t client_of(const char *service) {
     char name[64];
     (void)snprintf(name, sizeof name, "rq/iwheel/%sRequest", service);
@@ -68,7 +68,7 @@ static dds_entity_t client_of(const char *service) {
     return writer;
 }
 
-/// False: none came in this time.
+/// Waits for a request. Returns false if none came in this time.
 static bool await_request(ros_request_t *out_request, unsigned for_ms) {
     for (unsigned ms = 0; ms < for_ms; ms += 5U) {
         if (ros_take_request(ros, out_request)) {
@@ -105,7 +105,7 @@ static void test_dds_client_that_disposes_and_goes_is_no_request(void) {
     TEST_ASSERT_FALSE(await_request(&request, 200));
 }
 
-/// A reader of replies that is there only now, where the request was written before.
+/// A reader of replies that is created only now, after the request was written.
 static dds_entity_t reader_of(const char *service) {
     char name[64];
     (void)snprintf(name, sizeof name, "rr/iwheel/%sReply", service);
@@ -118,7 +118,7 @@ static dds_entity_t reader_of(const char *service) {
     return reader;
 }
 
-/// The number of replies that come in this time.
+/// Returns the number of replies that come in this time.
 static unsigned count_replies(dds_entity_t reader, unsigned for_ms) {
     unsigned count = 0;
     for (unsigned ms = 0; ms < for_ms; ms += 5U) {
@@ -145,17 +145,17 @@ static void test_dds_reply_waits_for_the_reader_of_its_caller(void) {
     (void)dds_delete(peer);
 }
 
-static void test_dds_replies_to_callers_without_a_reader_leave_in_the_end(void) {
+static void test_dds_replies_to_callers_without_reader_are_sent_later(void) {
     static const ros_raw_t raw = {.size = 5, .bytes = {0, 1}};
     ros_request_t request;
     const dds_entity_t writer = client_of("arm");
-    for (unsigned i = 0; i < 12U; i++) { // More than wait at a time.
+    for (unsigned i = 0; i < 12U; i++) { // More than can wait together.
         TEST_ASSERT_EQUAL_INT32(DDS_RETCODE_OK, dds_write(writer, &raw));
         TEST_ASSERT_TRUE(await_request(&request, 2000));
         ros_answer(ros, &request, true, "armed");
     }
     dds_sleepfor(DDS_MSECS(1050));
-    ros_woken(ros); // Nobody hears these.
+    ros_woken(ros); // These replies have no reader.
     const dds_entity_t reader = reader_of("arm");
     TEST_ASSERT_EQUAL_UINT(0, count_replies(reader, 300));
     TEST_ASSERT_EQUAL_INT32(DDS_RETCODE_OK, dds_write(writer, &raw));
@@ -172,6 +172,6 @@ int main(void) {
     RUN_TEST(test_dds_sample_that_cannot_be_read_is_a_request);
     RUN_TEST(test_dds_client_that_disposes_and_goes_is_no_request);
     RUN_TEST(test_dds_reply_waits_for_the_reader_of_its_caller);
-    RUN_TEST(test_dds_replies_to_callers_without_a_reader_leave_in_the_end);
+    RUN_TEST(test_dds_replies_to_callers_without_reader_are_sent_later);
     return UNITY_END();
 }

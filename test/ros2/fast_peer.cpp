@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// A peer of another make: Fast DDS, which ROS 2 uses by default. Reads odom, publishes cmd_vel and iwheel/ask; one line for each thing seen.
+// A peer of another vendor: Fast DDS, the default of ROS 2. Reads odom, publishes cmd_vel and iwheel/ask; prints one line for each event.
 //
-//     fast_peer DOMAIN SPEED_M_S          asks to arm, drives for 1.5 s, ends
-//     fast_peer DOMAIN SERVICE CALLS      calls a service so often, each time as a new client, as rmw_fastrtps does; 0: 100 clients that call nothing
-//     fast_peer DOMAIN SERVICE late       calls it before the other side knows the writer: what announces it leaves LATE later
-//     fast_peer DOMAIN SERVICE kept       the same by a writer that keeps its samples, and has written two before anybody was there
+//     fast_peer DOMAIN SPEED_M_S          requests to arm, drives for 1.5 s, ends
+//     fast_peer DOMAIN SERVICE CALLS      calls a service this often, each time as a new client, as rmw_fastrtps does; 0: 100 clients without a call
+//     fast_peer DOMAIN SERVICE late       calls it before the bridge knows the writer: the announcement is sent LATE later
+//     fast_peer DOMAIN SERVICE stored     the same with a writer that stores its samples, and has written two before the bridge was there
 #include <fastcdr/Cdr.h>
 #include <fastcdr/FastBuffer.h>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
@@ -43,7 +43,7 @@
 
 using namespace eprosima::fastdds::dds;
 using eprosima::fastcdr::Cdr;
-// Debian 12 has version 2, Debian 13 version 3, in which much is called otherwise.
+// Debian 12 has version 2, Debian 13 version 3, in which many names differ.
 #if FAST_DDS == 2
 namespace rtps = eprosima::fastrtps::rtps;
 static const auto CDR = Cdr::DDS_CDR;
@@ -54,7 +54,7 @@ static const auto CDR = eprosima::fastcdr::CdrVersion::DDS_CDR;
 static const auto OK = RETCODE_OK;
 #endif
 
-// ---- what leaves late -------------------------------------------------------------------------------------------------
+// ---- delayed announcements --------------------------------------------------------------------------------------------
 
 struct Datagram {
     int fd;
@@ -66,7 +66,7 @@ static std::mutex lock;
 static bool holding = false;
 static std::vector<Datagram> held;
 
-// Whether it has a DATA of the writer that announces writers.
+// Returns true if the bytes have a DATA of the writer that announces writers.
 static bool announces(const std::vector<uint8_t> &bytes) {
     static const uint8_t announcer[4] = {0, 0, 3, 0xC2};
     for (size_t at = 20; at + 16 <= bytes.size();) {
@@ -79,7 +79,7 @@ static bool announces(const std::vector<uint8_t> &bytes) {
     return false;
 }
 
-static bool keep_back(int fd, const std::vector<uint8_t> &bytes, const void *to, size_t to_size) {
+static bool delay(int fd, const std::vector<uint8_t> &bytes, const void *to, size_t to_size) {
     const auto *begin = static_cast<const uint8_t *>(to);
     std::lock_guard<std::mutex> guard(lock);
     if (holding && announces(bytes)) {
@@ -89,10 +89,10 @@ static bool keep_back(int fd, const std::vector<uint8_t> &bytes, const void *to,
     return false;
 }
 
-// In the place of libc's: Fast DDS sends by one or the other.
+// These replace the functions of libc: Fast DDS sends with one or the other.
 extern "C" ssize_t sendto(int fd, const void *data, size_t size, int flags, const struct sockaddr *to, socklen_t to_size) {
     const auto *begin = static_cast<const uint8_t *>(data);
-    if (keep_back(fd, {begin, begin + size}, to, to_size)) {
+    if (delay(fd, {begin, begin + size}, to, to_size)) {
         return static_cast<ssize_t>(size);
     }
     return syscall(SYS_sendto, fd, data, size, flags, to, to_size);
@@ -104,7 +104,7 @@ extern "C" ssize_t sendmsg(int fd, const struct msghdr *message, int flags) {
         const auto *begin = static_cast<const uint8_t *>(message->msg_iov[i].iov_base);
         bytes.insert(bytes.end(), begin, begin + message->msg_iov[i].iov_len);
     }
-    if (keep_back(fd, bytes, message->msg_name, message->msg_namelen)) {
+    if (delay(fd, bytes, message->msg_name, message->msg_namelen)) {
         return static_cast<ssize_t>(bytes.size());
     }
     return syscall(SYS_sendmsg, fd, message, flags);
@@ -117,14 +117,14 @@ static void hold(bool wanted) {
         (void)syscall(SYS_sendto, datagram.fd, datagram.bytes.data(), datagram.bytes.size(), 0, datagram.to.data(), datagram.to.size());
     }
     if (!wanted) {
-        std::printf("%zu announcements left late\n", held.size());
+        std::printf("%zu announcements sent late\n", held.size());
     }
     held.clear();
 }
 
 // ---- types ------------------------------------------------------------------------------------------------------------
 
-// What all three need: numbers and texts in the order in which they stand in the message.
+// Common to all three: numbers and texts in the order of the message.
 struct Values {
     std::vector<double> numbers;
     std::vector<std::string> texts;
@@ -238,9 +238,9 @@ struct Node {
         type.register_type(participant);
         return participant->create_topic(name, type_name, TOPIC_QOS_DEFAULT);
     }
-    DataWriter *writer(Topic *topic, bool kept = false) {
-        DataWriterQos qos = DATAWRITER_QOS_DEFAULT; // Reliable, keep last: as rmw_fastrtps by default.
-        qos.durability().kind = kept ? TRANSIENT_LOCAL_DURABILITY_QOS : VOLATILE_DURABILITY_QOS;
+    DataWriter *writer(Topic *topic, bool stored = false) {
+        DataWriterQos qos = DATAWRITER_QOS_DEFAULT; // Reliable, keep last: the default of rmw_fastrtps.
+        qos.durability().kind = stored ? TRANSIENT_LOCAL_DURABILITY_QOS : VOLATILE_DURABILITY_QOS;
         qos.history().depth = 10;
         return publisher->create_datawriter(topic, qos);
     }
@@ -252,7 +252,7 @@ struct Node {
     }
 };
 
-// By unicast to the ports of the first participants of this machine: there may be no multicast.
+// Uses unicast to the ports of the first participants of this machine, because there may be no multicast.
 static DomainParticipant *join(uint32_t domain) {
     DomainParticipantQos qos = PARTICIPANT_QOS_DEFAULT;
     for (uint32_t number = 0; number < 8; number++) {
@@ -319,10 +319,10 @@ static void call(const Client &client, bool late) {
     std::fflush(stdout);
 }
 
-// The clients of rmw_fastrtps: the request names the reader of its replies, and the reply that request's identity.
+// The clients of rmw_fastrtps: the request names the reader of its replies, and the reply has that request's identity.
 static void call_service(Node &node, const std::string &name, const std::string &how) {
-    const bool kept = how == "kept";
-    const bool late = kept || how == "late";
+    const bool stored = how == "stored";
+    const bool late = stored || how == "late";
     const int calls = late ? 1 : std::atoi(how.c_str());
     Topic *request_topic = node.topic(Kind::Request, ("rq/" + name + "Request").c_str(), "std_srvs::srv::dds_::Trigger_Request_");
     Topic *reply_topic = node.topic(Kind::Reply, ("rr/" + name + "Reply").c_str(), "std_srvs::srv::dds_::Trigger_Response_");
@@ -331,12 +331,12 @@ static void call_service(Node &node, const std::string &name, const std::string 
         if (late) {
             hold(true);
         }
-        const Client client = {node.reader(reply_topic), node.writer(request_topic, kept)};
-        for (int old = 0; kept && old < 2; old++) {
+        const Client client = {node.reader(reply_topic), node.writer(request_topic, stored)};
+        for (int old = 0; stored && old < 2; old++) {
             (void)request(client);
         }
-        if (kept) {
-            std::printf("two are kept\n");
+        if (stored) {
+            std::printf("two are stored\n");
             std::fflush(stdout);
         }
         await_service(client);

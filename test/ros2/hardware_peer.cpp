@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The hardware interface's logic as ros2_control calls it: a line of standard input is a call, a line of standard output its result.
+// The hardware interface's logic with the calls of ros2_control: a line of standard input is a call, a line of standard output its result.
 //     open SOCKET | activate | deactivate | close | cycles COUNT LEFT RIGHT    (read and write at 50 Hz, rad/s)
 #include <chrono>
 #include <iostream>

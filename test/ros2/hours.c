@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
 // Hours of the bridge in virtual time: its own code and the gateway's own loop in one process, in the daemon's rig. ROS is another participant
-// of the DDS domain. Nothing may grow: heap, descriptors, DDS entities. See --help.
+// of the DDS domain. Heap, descriptors and DDS entities must not grow. See --help.
 //
-// Virtual is what hours_rig.h says. DDS itself lives in real time; between two
-// participants of one process it delivers within the call, so nothing waits for it. What participants that come and go cost, over sockets, is
-// seen in real time (rides.py, publishers_come_and_go): DDS lets go of them after seconds that cannot be hurried.
+// hours_rig.h describes the virtual part. DDS itself runs in real time; between two
+// participants of one process it delivers within the call, so nothing waits for it. The cost of participants that come and go, over sockets, is
+// tested in real time (test_rides.py, publishers_come_and_go): DDS releases them after some seconds that cannot be shortened.
 #include "free_domain.h"
 #include "hours_rig.h"
 #include "ros2_bridge.h"
@@ -20,13 +20,13 @@
 
 #define PASS_MS   5U
 #define MINUTE_MS 60000U
-/// What may come and go within an hour: buffers of DDS, samples on their way.
+/// Permitted growth within an hour: buffers of DDS, samples in flight.
 #define HEAP_SLACK 16384
 
 typedef struct {
     dds_entity_t participant;
     dds_entity_t publishers[2];
-    dds_entity_t commands; ///< The one of them that publishes.
+    dds_entity_t commands; ///< The one that publishes.
     dds_entity_t asks;
     dds_entity_t odom;
     dds_entity_t diagnostics;
@@ -120,7 +120,7 @@ static uint64_t take_all(dds_entity_t reader) {
 static void pass(unsigned for_ms) {
     for (unsigned ms = 0; ms < for_ms; ms += PASS_MS) {
         const iw_time_us_t until_us = daemon_rig.now_us + MS(PASS_MS);
-        bridge_step(&bridge); // May have waited.
+        bridge_step(&bridge); // The step may have waited.
         if (daemon_rig.now_us < until_us) {
             hours_run_gateway((unsigned)((until_us - daemon_rig.now_us + 999U) / IW_US_PER_MS));
         }
@@ -129,7 +129,7 @@ static void pass(unsigned for_ms) {
     }
 }
 
-/// Commands with a distance, for so long.
+/// Sends commands with a distance, for that long.
 static void stream(double v, double yaw, unsigned every_ms, unsigned for_ms) {
     for (unsigned ms = 0; ms < for_ms; ms += every_ms) {
         command(v, yaw, 0);
@@ -151,7 +151,7 @@ static unsigned roll(unsigned sides) {
     return (dice >> 16) % sides;
 }
 
-// ---- what happens ---------------------------------------------------------------------------------------------------
+// ---- the events -----------------------------------------------------------------------------------------------------
 
 static void arm(void) {
     for (unsigned tries = 0; tries < 20U && daemon_rig_state() != IW_STATE_ARMED; tries++) {
@@ -192,7 +192,7 @@ static void crash_gateway(void) {
     stream(0.3, 0.0, 50, 1000U + roll(4000));
     daemon_rig_start();
     tally.crashes++;
-    pass(6000); // Found again, and the hold of the restart is over.
+    pass(6000); // The bridge has found it again, and the hold of the restart has ended.
 }
 
 static void hang_gateway(void) {
@@ -223,7 +223,7 @@ static void send_rubbish(void) {
     assert_told_zero();
 }
 
-/// Drives for most of a minute, then something happens.
+/// Drives for most of a minute, then makes an event happen.
 static void minute(void) {
     arm();
     stream(0.05 * (double)roll(8), 0.1 * ((double)roll(7) - 3.0), 20U + 5U * roll(7), 40000);
@@ -261,7 +261,7 @@ static void minute(void) {
     pass(1000);
 }
 
-// ---- how large it is ------------------------------------------------------------------------------------------------
+// ---- the size -------------------------------------------------------------------------------------------------------
 
 static unsigned count_entities(dds_entity_t entity) {
     dds_entity_t children[128];
@@ -285,7 +285,7 @@ static void test_ros2_bridge_in_hours_of_everything_does_not_grow(void) {
     size_of_all_t first = {0};
     for (unsigned minutes = 1; daemon_rig.now_us < end_us; minutes++) {
         minute();
-        // What happens first makes room for itself: after five minutes there is all of it.
+        // The first events allocate buffers: after five minutes all of them exist.
         if (first.entities == 0U && (minutes == 5U || daemon_rig.now_us - begin_us > (end_us - begin_us) / 2U)) {
             first = measure();
         }
@@ -298,13 +298,14 @@ static void test_ros2_bridge_in_hours_of_everything_does_not_grow(void) {
     }
     const size_of_all_t last = measure();
     const double seconds = (double)(daemon_rig.now_us - begin_us) / 1e6;
-    (void)printf("%.2f h: %llu odom heard, %llu commands sent, %llu passed on, %llu late, %llu bad; armed %u times, %u "
-                 "resets, %u e-stops, %u crashes and "
-                 "%u hangs of the gateway, %u changes of the publisher; heap %zu to %zu bytes\n",
-                 seconds / 3600.0, (unsigned long long)peer.odoms, (unsigned long long)peer.sent,
-                 (unsigned long long)bridge.facts.commands.passed, (unsigned long long)bridge.facts.commands.late,
-                 (unsigned long long)bridge.facts.commands.bad, tally.armed, tally.resets, tally.presses, tally.crashes,
-                 tally.hangs, tally.publishers, first.heap, last.heap);
+    (void)printf(
+        "%.2f h: %llu odom received, %llu commands sent, %llu passed on, %llu late, %llu bad; armed %u times, %u "
+        "resets, %u e-stops, %u crashes and "
+        "%u hangs of the gateway, %u changes of the publisher; heap %zu to %zu bytes\n",
+        seconds / 3600.0, (unsigned long long)peer.odoms, (unsigned long long)peer.sent,
+        (unsigned long long)bridge.facts.commands.passed, (unsigned long long)bridge.facts.commands.late,
+        (unsigned long long)bridge.facts.commands.bad, tally.armed, tally.resets, tally.presses, tally.crashes,
+        tally.hangs, tally.publishers, first.heap, last.heap);
     TEST_ASSERT_LESS_OR_EQUAL_size_t_MESSAGE(first.heap + HEAP_SLACK, last.heap, "the heap grows");
     TEST_ASSERT_EQUAL_UINT_MESSAGE(first.descriptors, last.descriptors, "descriptors");
     TEST_ASSERT_EQUAL_UINT_MESSAGE(first.entities, last.entities, "DDS entities");
@@ -339,8 +340,8 @@ static void begin(void) {
 int main(int count, char **arguments) {
     if (count > 1 && strcmp(arguments[1], "--help") == 0) {
         (void)puts("usage: ros2_hours [HOURS]\n\nThe bridge to ROS 2 and the gateway in virtual time: driving at 20 to "
-                   "50 Hz with all that can happen; 0.2 hours "
-                   "unless told. Nothing may grow.");
+                   "50 Hz with all events; default 0.2 "
+                   "hours. Memory and descriptors must not grow.");
         return 0;
     }
     hours = (count > 1) ? strtod(arguments[1], NULL) : hours;

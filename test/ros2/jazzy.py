@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A real ROS 2: rclpy of Jazzy or Kilted as ./check installs it, with ros2cli and rmw_cyclonedds_cpp where somebody has installed them.
+"""A real ROS 2: rclpy of Jazzy or Kilted as ./check installs it, with ros2cli and rmw_cyclonedds_cpp if they are installed.
 
-IWHEEL_ROS: its folder (default build/ros-jazzy; build/ros-kilted is Kilted). IWHEEL_ROS2CLI: a folder of Python modules with ros2cli and its commands; without it the same
+IWHEEL_ROS: its folder (default build/ros-jazzy; build/ros-kilted is Kilted). IWHEEL_ROS2CLI: a folder of Python modules with ros2cli and its commands; without it the
 commands go through rclpy (typed.py). IWHEEL_RMW_CYCLONEDDS: librmw_cyclonedds_cpp.so of Jazzy; without it that vendor's tests are skipped.
 """
 
@@ -17,7 +17,7 @@ from scenario import Skip
 HERE = os.path.dirname(os.path.abspath(__file__))
 ROOT = os.path.dirname(os.path.dirname(HERE))
 PROFILE = os.path.join(ROOT, "share", "ros2", "fastdds-loopback.xml")
-SHARE = "/usr/share/iwheel-ros2/"  # As the pages write it; in the tree it is share/ros2.
+SHARE = "/usr/share/iwheel-ros2/"  # The path in the pages; in the tree it is share/ros2.
 PROFILES = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")  # Fast DDS 2 (Jazzy) and 3 (Kilted).
 CLI = "import sys; from ros2cli.cli import main; sys.exit(main())"
 
@@ -47,7 +47,7 @@ class Jazzy:
         self.cli = os.environ.get("IWHEEL_ROS2CLI")
 
     def words(self, command):
-        """What is started for a command as a person types it."""
+        """The program to start for a command as a person types it."""
         typed = [word.replace(SHARE, os.path.join(ROOT, "share", "ros2") + "/") for word in shlex.split(command)]
         if typed[0] == "python3":
             return [self.python, *typed[1:]]
@@ -58,7 +58,7 @@ class Jazzy:
         return subprocess.Popen(self.words(command), env=typed, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True)
 
     def type(self, command, seconds=20, **environment):
-        """What the command printed; it is interrupted as by Ctrl-C if it has no end of its own in this time."""
+        """The output of the command; it is interrupted like by Ctrl-C if it has not ended in this time."""
         child = self.start(command, **environment)
         try:
             return child.communicate(timeout=seconds)[0]
@@ -66,7 +66,7 @@ class Jazzy:
             return finish(child)
 
     def call(self, ride, *services):
-        """The answers, as jazzy_caller.py prints them."""
+        """The replies that jazzy_caller.py prints."""
         command = [self.python, os.path.join(HERE, "jazzy_caller.py"), *services]
         done = subprocess.run(command, env=self.environment, capture_output=True, text=True, timeout=60, check=False, cwd=ride.rig.folder)
         answers = [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
@@ -74,7 +74,7 @@ class Jazzy:
 
 
 def finish(child):
-    """Ctrl-C; what it has printed."""
+    """Sends Ctrl-C; returns the output."""
     os.killpg(child.pid, signal.SIGINT)
     try:
         return child.communicate(timeout=5)[0]

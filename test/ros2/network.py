@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Two machines for one scenario: network namespaces of its own, joined by a cable. And RTPS packets, recorded and sent again."""
+"""Two machines for one scenario: separate network namespaces, joined by a cable. And RTPS packets, recorded and sent again."""
 
 import ctypes
 import json
@@ -32,7 +32,7 @@ for at_s, port, data in json.load(open(sys.argv[2])):
 
 
 def leave_network():
-    """This thread, and what it starts, have a network of their own."""
+    """Moves this thread, and its child processes, into a new network."""
     if ctypes.CDLL(None, use_errno=True).unshare(CLONE_NEWNET) != 0:
         raise OSError(ctypes.get_errno(), "unshare")
 
@@ -42,7 +42,7 @@ def ip(*words):
 
 
 class Cable:
-    """From now on this scenario is on the machine HERE_ADDRESS; `there` runs a command on THERE_ADDRESS."""
+    """Moves this scenario to the machine HERE_ADDRESS; `there` runs a command on THERE_ADDRESS."""
 
     def __init__(self, t):
         try:
@@ -56,7 +56,7 @@ class Cable:
                 subprocess.run(self.there("ip", *words), check=True, capture_output=True, timeout=10)
         except (OSError, subprocess.SubprocessError) as error:
             raise Skip(f"no network namespaces here ({error}); they need root, iproute2 and util-linux") from error
-        t.check(self.carries(), "what the other machine sends arrives")
+        t.check(self.carries(), "packets of the other machine arrive")
 
     def carries(self):
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
@@ -75,7 +75,7 @@ class Cable:
 
 
 def ports_of(pid):
-    """UDP ports at which this process receives for every address, as the kernel tells."""
+    """UDP ports at which this process receives for every address, from the kernel's table."""
     inodes = set()
     for fd in os.listdir(f"/proc/{pid}/fd"):
         try:
@@ -114,7 +114,7 @@ class Tape(threading.Thread):
         self.join(2)
 
     def of(self, prefix, ports):
-        """What this participant sent to these ports, without what only fits one conversation."""
+        """The packets of this participant to these ports, without parts that belong to one conversation."""
         chosen = [(at, port, one_way(data)) for at, port, data in self.packets if port in ports and data[8:20] == prefix]
         return [(at - chosen[0][0], port, data.hex()) for at, port, data in chosen]
 
@@ -131,12 +131,12 @@ def submessages(data):
 
 
 def one_way(data):
-    """Nobody needs to be listened to for this: it names no receiver and confirms nothing."""
+    """The packet without parts that need a receiver: it names no receiver and acknowledges nothing."""
     return data[:20] + b"".join(part for kind, part in submessages(data) if kind not in (ACKNACK, INFO_DST))
 
 
 def timeless(packets):
-    """The same without time stamps."""
+    """The same packets without time stamps."""
     return [
         (at, port, (bytes.fromhex(data)[:20] + b"".join(part for kind, part in submessages(bytes.fromhex(data)) if kind != INFO_TS)).hex())
         for at, port, data in packets
@@ -144,7 +144,7 @@ def timeless(packets):
 
 
 def fresh(data, now):
-    """The same, sent now by its own time stamps."""
+    """The same packet with the current time in its stamps."""
     made = data[:20]
     for kind, part in submessages(data):
         if kind == INFO_TS and len(part) == 12:
@@ -155,7 +155,7 @@ def fresh(data, now):
 
 
 def send_again(cable, packets, path, address):
-    """From the other machine (`cable`), or from this one (None), with the pauses that they had."""
+    """Sends the packets from the other machine (`cable`), or from this one (None), with their original pauses."""
     with open(path, "w", encoding="utf-8") as file:
         json.dump(packets, file)
     command = [sys.executable, "-c", SENDER, address, path, os.path.dirname(os.path.abspath(__file__)), *sys.path]

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The order of what comes from ROS in one wake-up: the bridge's own code and the gateway's own loop in virtual time (hours_rig.h). ROS is this
-// file: one command and one request may wait when the bridge looks.
+// The order of messages from ROS in one wake-up: the bridge's own code and the gateway's own loop in virtual time (hours_rig.h). This file
+// replaces ROS: one command and one request may wait when the bridge polls.
 #include "bridge_parts.h"
 #include "hours_rig.h"
 
@@ -29,7 +29,7 @@ ros_t *ros_open(const ros_settings_t *wanted, ros_came_t came, void *context, FI
     (void)came;
     (void)context;
     (void)err;
-    return (ros_t *)&bridge; // Only compared with NULL.
+    return (ros_t *)&bridge; // The bridge only compares it with NULL.
 }
 
 void ros_close(ros_t *self) {
@@ -107,7 +107,7 @@ void ros_publish_state(ros_t *self, const char *json) {
     (void)json;
 }
 
-// ---- what comes -----------------------------------------------------------------------------------------------------
+// ---- messages -------------------------------------------------------------------------------------------------------
 
 static void command_comes(double v_m_s) {
     command = (ros_command_t){.linear = {v_m_s, 0.0, 0.0}, .source = 1, .sent_us = hours_wall_ns() / 1000};
@@ -124,7 +124,7 @@ static void request_comes(ros_verb_t verb) {
 static void pass(unsigned for_ms) {
     for (unsigned ms = 0; ms < for_ms; ms += PASS_MS) {
         const iw_time_us_t until_us = daemon_rig.now_us + MS(PASS_MS);
-        bridge_step(&bridge); // May have waited.
+        bridge_step(&bridge); // The step may have waited.
         if (daemon_rig.now_us < until_us) {
             hours_run_gateway((unsigned)((until_us - daemon_rig.now_us + 999U) / IW_US_PER_MS));
         }
@@ -161,7 +161,7 @@ static void test_ros_command_that_came_with_arm_prevents_it(void) {
     command_comes(0.3);
     request_comes(ROS_ARM);
     pass(300);
-    TEST_ASSERT_TRUE(answered && !success); // The gateway knows the intention from before: stale_command.
+    TEST_ASSERT_TRUE(answered && !success); // The gateway has seen the earlier commands: stale_command.
     TEST_ASSERT_EQUAL_INT16(0, daemon_rig.commanded_mm_s[IW_LEFT]);
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, daemon_rig_state());
 }
@@ -210,7 +210,7 @@ static void test_ros_command_that_was_late_is_not_passed(void) {
 
 static void test_ros_estop_latches_and_reset_is_not_for_the_network(void) {
     request_comes(ROS_ESTOP);
-    pass(3000); // The gateway itself would take a reset now.
+    pass(3000); // The gateway itself would accept a reset now.
     TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
     request_comes(ROS_RESET);
     pass(500);
@@ -246,12 +246,12 @@ static void test_ros_estop_topic_shows_the_line_once_for_each_change(void) {
     TEST_ASSERT_EQUAL_UINT(4, estop_count);
     daemon_rig.estop = 0;
     pass(300);
-    bridge_step(&bridge); // Takes what waits.
+    bridge_step(&bridge); // This step reads the waiting messages.
     TEST_ASSERT_EQUAL_INT(0, estop_shown);
     (void)snprintf(bridge.facts.machine.estop, sizeof bridge.facts.machine.estop, "none");
     bridge.facts.link = ROS_LINK_SILENT;
     bridge_step(&bridge);
-    TEST_ASSERT_EQUAL_INT(1, estop_shown); // A line that was there and is gone is one that cannot be read.
+    TEST_ASSERT_EQUAL_INT(1, estop_shown); // A line that has disappeared counts as unreadable.
 }
 
 static void test_ros_arm_takes_no_lease_from_another_client(void) {
@@ -270,7 +270,7 @@ static void test_ros_arm_that_was_late_is_refused(void) {
     request_comes(ROS_STOP);
     pass(3000);
     request_comes(ROS_ARM);
-    request.sent_us -= 600000; // The gateway would take it.
+    request.sent_us -= 600000; // The gateway would accept it.
     pass(200);
     TEST_ASSERT_TRUE(answered && !success);
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, daemon_rig_state());
@@ -280,7 +280,7 @@ static void test_ros_first_command_of_a_minute_ago_moves_nothing(void) {
     arm();
     for (unsigned i = 0; i < 40U; i++) {
         command_comes(0.3);
-        command.source = 100U + i; // A writer for each.
+        command.source = 100U + i; // A different writer for each.
         command.sent_us -= 60000000;
         pass(20);
     }
@@ -320,7 +320,7 @@ static void test_ros_reset_means_a_stop_that_was_shown_for_a_second(void) {
     bridge.settings.drive.allow_reset = true;
     request_comes(ROS_ESTOP);
     pass(3000);
-    request_comes(ROS_STOP); // No new stop.
+    request_comes(ROS_STOP); // This is no new stop.
     pass(100);
     bridge.shown_us = bridge_monotonic_us() - 900000;
     request_comes(ROS_RESET);
@@ -328,7 +328,7 @@ static void test_ros_reset_means_a_stop_that_was_shown_for_a_second(void) {
     TEST_ASSERT_TRUE(answered && !success);
     TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
     pass(200);
-    bridge.shown.value++; // The reset of another stop.
+    bridge.shown.value++; // This reset belongs to another stop.
     request_comes(ROS_RESET);
     pass(20);
     TEST_ASSERT_TRUE(answered && !success);
@@ -345,7 +345,7 @@ static void test_ros_arm_from_before_a_stop_is_refused_by_the_gateway(void) {
     daemon_rig_ask(other, "{\"cmd\":\"stop\",\"id\":1}");
     pass(100);
     request_comes(ROS_ARM);
-    request.sent_us -= 200000; // Young enough, and meant before that stop.
+    request.sent_us -= 200000; // Recent enough, but sent before that stop.
     pass(200);
     TEST_ASSERT_TRUE(answered && !success);
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, daemon_rig_state());
@@ -354,7 +354,7 @@ static void test_ros_arm_from_before_a_stop_is_refused_by_the_gateway(void) {
 
 static void test_ros_arm_while_a_dropped_command_moves_is_refused(void) {
     command_comes(0.3);
-    command.sent_us -= 5000000; // The gateway does not see it.
+    command.sent_us -= 5000000; // The gateway does not receive it.
     pass(300);
     request_comes(ROS_ARM);
     pass(100);
@@ -386,9 +386,9 @@ static void test_ros_one_person_drives_of_two_that_publish(void) {
 
 static void test_ros_one_person_keeps_the_wheels_until_they_are_stopped(void) {
     arm();
-    command_comes_of(2, 0.0); // Zeros take nothing.
+    command_comes_of(2, 0.0); // Zeros do not take over.
     command_comes_of(1, 0.3);
-    for (unsigned i = 0; i < 50U; i++) { // The first one's zeros keep the lease; the second one's keep nothing.
+    for (unsigned i = 0; i < 50U; i++) { // Zeros of the first publisher renew the lease; those of the second do not.
         command_comes_of(1, 0.0);
         command_comes_of(2, 0.0);
     }
@@ -407,14 +407,14 @@ static void test_ros_one_person_keeps_the_wheels_until_they_are_stopped(void) {
 }
 
 static void test_ros_one_person_without_the_lease_has_nothing(void) {
-    command_comes_of(1, 0.3); // Not armed: refused, and nobody's.
+    command_comes_of(1, 0.3); // Not armed: it is refused, and no publisher has the wheels.
     pass(1000);
     arm();
     for (unsigned i = 0; i < 3U; i++) {
         command_comes_of(2, 0.3);
     }
     TEST_ASSERT_GREATER_THAN_INT16(0, daemon_rig.commanded_mm_s[IW_LEFT]);
-    pass(3000); // The lease ends by itself.
+    pass(3000); // The lease ends on its own.
     TEST_ASSERT_EQUAL_UINT64(0, bridge.driver);
     arm();
     for (unsigned i = 0; i < 3U; i++) {
@@ -429,7 +429,7 @@ static void test_ros_lease_that_ended_unseen_is_nobodys(void) {
     command_comes_of(1, 0.0);
     pass(3000);
     arm();
-    command_comes_of(1, 0.001); // Less than a wheel can be told, and not zero.
+    command_comes_of(1, 0.001); // Less than the smallest command of a wheel, and not zero.
     bridge.driver = 1;
     const int other = daemon_rig_connect();
     daemon_rig_ask(other, "{\"cmd\":\"stop\",\"id\":1}");
@@ -449,7 +449,7 @@ static void on_a_network(bool synchronised) {
     pass(1000);
 }
 
-static void test_ros_other_machine_may_not_arm_without_synchronised_clocks(void) {
+static void test_ros_other_machine_without_synchronised_clock_cannot_arm(void) {
     on_a_network(false);
     request_comes(ROS_ARM);
     pass(200);
@@ -469,7 +469,7 @@ static void test_ros_other_machine_drives_when_its_clock_is_known(void) {
     TEST_ASSERT_EQUAL_UINT64(20, bridge.facts.commands.unknown);
     TEST_ASSERT_EQUAL_UINT64(0, bridge.facts.commands.passed);
     TEST_ASSERT_EQUAL_INT16(0, daemon_rig.commanded_mm_s[IW_LEFT]);
-    for (unsigned i = 0; i < 60U; i++) { // Zeros pass, and teach.
+    for (unsigned i = 0; i < 60U; i++) { // Zeros pass, and the bridge learns from them.
         command_comes(0.0);
         pass(20);
     }
@@ -480,7 +480,7 @@ static void test_ros_other_machine_drives_when_its_clock_is_known(void) {
     TEST_ASSERT_GREATER_THAN_INT16(0, daemon_rig.commanded_mm_s[IW_LEFT]);
 }
 
-static void test_ros_other_machine_of_an_unknown_clock_does_not_arm_by_command(void) {
+static void test_ros_command_of_unknown_clock_does_not_arm(void) {
     settings.drive.auto_arm = true;
     on_a_network(false);
     command_comes(0.0);
@@ -558,9 +558,9 @@ int main(void) {
     RUN_TEST(test_ros_one_person_keeps_the_wheels_until_they_are_stopped);
     RUN_TEST(test_ros_one_person_without_the_lease_has_nothing);
     RUN_TEST(test_ros_lease_that_ended_unseen_is_nobodys);
-    RUN_TEST(test_ros_other_machine_may_not_arm_without_synchronised_clocks);
+    RUN_TEST(test_ros_other_machine_without_synchronised_clock_cannot_arm);
     RUN_TEST(test_ros_other_machine_drives_when_its_clock_is_known);
-    RUN_TEST(test_ros_other_machine_of_an_unknown_clock_does_not_arm_by_command);
+    RUN_TEST(test_ros_command_of_unknown_clock_does_not_arm);
     RUN_TEST(test_ros_command_that_arms_does_not_drive);
     RUN_TEST(test_ros_request_that_cannot_be_read_only_stops);
     RUN_TEST(test_ros_stop_at_rest_ends_arming_by_commands);

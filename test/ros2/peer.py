@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Another participant of the DDS domain, by PyPI's cyclonedds: publishes, subscribes and calls services as a ROS 2 node would.
+"""Another participant of the DDS domain, with PyPI's cyclonedds: publishes, subscribes and calls services like a ROS 2 node.
 
-Its types are made from ROS's own message definitions, which PyPI's rosbags brings, so nothing here is copied from the bridge.
+Its types are made from ROS's own message definitions in PyPI's rosbags, so nothing here is copied from the bridge.
 """
 
 import os
@@ -10,7 +10,7 @@ import time
 LOOPBACK = """<CycloneDDS><Domain Id="any"><General><Interfaces><NetworkInterface name="lo" multicast="false"/></Interfaces>
 <AllowMulticast>false</AllowMulticast></General><Discovery><ParticipantIndex>auto</ParticipantIndex>
 <MaxAutoParticipantIndex>32</MaxAutoParticipantIndex><Peers><Peer address="localhost"/></Peers></Discovery></Domain></CycloneDDS>"""
-os.environ["CYCLONEDDS_URI"] = LOOPBACK  # Before cyclonedds is there.
+os.environ["CYCLONEDDS_URI"] = LOOPBACK  # This must precede the import of cyclonedds.
 
 from cyclonedds._clayer import ddspy_take
 from cyclonedds.core import Policy, Qos
@@ -27,8 +27,8 @@ BASES = {
     "uint32": types.uint32, "int64": types.int64, "uint64": types.uint64, "float32": types.float32, "float64": types.float64,
     "string": str,
 }  # fmt: skip
-HEADER = "uint64 guid\nint64 seq\n"  # Of rmw_cyclonedds, before each request and reply.
-ANY = 0x7F  # Whatever state: DDS_ANY_STATE.
+HEADER = "uint64 guid\nint64 seq\n"  # rmw_cyclonedds puts this before each request and reply.
+ANY = 0x7F  # DDS_ANY_STATE.
 SECONDS_MAX = 10
 
 
@@ -65,25 +65,25 @@ class Types:
         return types.array[inner, detail[1]] if kind == Nodetype.ARRAY else types.sequence[inner]
 
 
-def quality(depth=10, reliable=True, kept=False):
-    """ROS's default; `kept`: transient local."""
+def quality(depth=10, reliable=True, transient=False):
+    """ROS's default QoS; `transient`: transient local."""
     return Qos(
         Policy.Reliability.Reliable(0) if reliable else Policy.Reliability.BestEffort,
         Policy.History.KeepLast(depth),
-        Policy.Durability.TransientLocal if kept else Policy.Durability.Volatile,
+        Policy.Durability.TransientLocal if transient else Policy.Durability.Volatile,
         Policy.DataRepresentation(use_cdrv0_representation=True, use_xcdrv2_representation=False),
     )
 
 
 class Reader:
-    """Collects (bytes, message as rosbags reads it, time of reception in s)."""
+    """Collects (bytes, message read by rosbags, time of reception in s)."""
 
     def __init__(self, peer, topic, name, **qos):
         self.peer, self.name, self.all = peer, name, []
         self.reader = DataReader(peer.participant, Topic(peer.participant, topic, peer.types.of(name)), quality(**qos))
 
     def take(self):
-        """All that came since the last time."""
+        """All messages since the last call."""
         taken = ddspy_take(self.reader._ref, ANY, 200)
         now, fresh = time.monotonic(), []
         for data, info in taken if isinstance(taken, list) else []:
@@ -114,7 +114,7 @@ class Writer:
 
     @classmethod
     def of(cls, peer, topic, **qos):
-        """A further writer of a topic."""
+        """Another writer of a topic."""
         made = cls.__new__(cls)
         made.writer = DataWriter(peer.participant, topic, quality(**qos))
         return made
@@ -126,7 +126,7 @@ class Writer:
         end = time.monotonic() + seconds
         while not self.writer.get_matched_subscriptions():
             if time.monotonic() > end:
-                raise TimeoutError("nobody reads this topic")
+                raise TimeoutError("this topic has no reader")
             time.sleep(0.005)
 
 
@@ -172,7 +172,7 @@ class Peer:
         return self.clients[service]
 
     def call(self, service, seconds=3.0, at_ns=None):
-        """(success, message) of a std_srvs/Trigger; None: no answer."""
+        """(success, message) of a std_srvs/Trigger; None: no reply."""
         request, reply = self.client(service)
         self.numbers += 1
         number = self.numbers

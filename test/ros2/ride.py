@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A rig with the bridge: gateway and simulator of the system tests, between gateway and bridge a tap that writes the timeline, and a peer."""
+"""A rig with the bridge: gateway and simulator of the system tests, a tap between gateway and bridge that writes the timeline, and a peer."""
 
 import json
 import os
@@ -18,12 +18,12 @@ TIMELINE = {"arm": "arm", "drive": "drive", "twist": "drive", "stop": "stop", "d
 
 
 class Tap(threading.Thread):
-    """Passes on all that bridge and gateway say to each other, and writes down for the judge what was asked and answered."""
+    """Passes all lines between bridge and gateway on, and records requests and replies for the judge."""
 
     def __init__(self, path, gateway_path, timeline):
         super().__init__(daemon=True)
         self.gateway_path, self.timeline = gateway_path, timeline
-        self.twists = []  # (t_us, v, yaw) as the bridge asked
+        self.twists = []  # (t_us, v, yaw) of the bridge's requests
         self.armed = False
         self.server = socket.socket(socket.AF_UNIX)
         self.server.bind(path)
@@ -93,7 +93,7 @@ class Tap(threading.Thread):
 
 
 class Stream(threading.Thread):
-    """Publishes cmd_vel at a rate until it is stopped; `make()` gives the message, or (message, source time in ns)."""
+    """Publishes cmd_vel at a rate until it is stopped; `make()` returns the message, or (message, source time in ns)."""
 
     def __init__(self, writer, make, every=0.05):
         super().__init__(daemon=True)
@@ -113,7 +113,7 @@ class Stream(threading.Thread):
         self.join(2)
 
 
-# For any machine, however busy: these scenarios judge the bridge.
+# These limits fit any machine, however busy: the scenarios judge the bridge.
 PATIENT = {"limits": {"wheel_silent_ms": 200, "echo_ms": 200}}
 
 
@@ -139,10 +139,10 @@ class Ride:
         if start:
             self.start_bridge()
         self.peer = Peer(self.domain, ros.get("namespace", ""), ros.get("release", "jazzy").upper())
-        self.state = self.peer.reader("iwheel/state", "std_msgs/msg/String", depth=50, kept=True)
+        self.state = self.peer.reader("iwheel/state", "std_msgs/msg/String", depth=50, transient=True)
         self.diagnostics = self.peer.reader("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", depth=50)
         if start and gateway:
-            t.check(self.await_state(lambda s: s["gateway"] == "up"), f"the bridge meets the gateway: {self.bridge.text()}")
+            t.check(self.await_state(lambda s: s["gateway"] == "up"), f"the bridge finds the gateway: {self.bridge.text()}")
 
     def program(self):
         return os.path.join(self.rig.build, "app", "bridge", "ros2", "iwheel-ros2")
@@ -157,7 +157,7 @@ class Ride:
         return json.loads(message.data) if message else None
 
     def await_diagnosis(self, name, part, seconds=4.0):
-        """A status of that name with these words in it; its level, or None."""
+        """Waits for a status of that name with these words; returns its level, or None."""
 
         def find(message):
             return [s for s in message.status if s.name == f"iwheel: {name}" and part in s.message]
@@ -175,7 +175,7 @@ class Ride:
         return Stream(writer or self.commands(), lambda: message, every)
 
     def arm(self):
-        """By the service; again for a while, where the wheels are not at rest yet."""
+        """Arms through the service; repeats for a while, until the wheels are at standstill."""
         for _ in range(60):
             answer = self.peer.call("iwheel/arm")
             if answer and answer[0]:
@@ -185,7 +185,7 @@ class Ride:
         return answer
 
     def driving(self, v=0.3, yaw=0.0, seconds=0.8, every=0.05):
-        """Armed and driving; returns the stream."""
+        """Arms and drives; returns the stream."""
         writer = self.commands()
         self.arm()
         stream = self.stream(v, yaw, writer, every)
@@ -197,7 +197,7 @@ class Ride:
         return any(speed for _, _, speed in self.rig.bus.setpoints(since_us or now_us() - 200_000))
 
     def still(self, seconds=0.6):
-        """Nothing but zeros is sent for so long."""
+        """True if only zeros are sent for that long."""
         begin_us = now_us()
         time.sleep(seconds)
         return not self.moving(begin_us)
@@ -207,7 +207,7 @@ class Ride:
         self.client = self.rig.client()
 
     def reset(self):
-        """By the operator, once the cause is gone and the wheels stand."""
+        """Resets as the operator, after the cause has ended and the wheels are at standstill."""
         end = time.monotonic() + 8
         while time.monotonic() < end:
             state = self.client.request("status")["state"]
@@ -219,7 +219,7 @@ class Ride:
         self.t.check(False, "reset")
 
     def silence(self):
-        """Until the gateway listens again: the judge wants to see the end of each session."""
+        """Waits until the gateway listens again: the judge needs the end of each session."""
         self.t.check(self.rig.wait_status(self.client, lambda s: s["state"] == "listening", 6), "silence")
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Programs that nobody here wrote: Fast DDS of Debian, and ROS 2 itself."""
+"""Programs of other vendors: Fast DDS of Debian, and ROS 2 itself."""
 
 import os
 import re
@@ -15,14 +15,14 @@ HERE = os.path.dirname(os.path.abspath(__file__))
 
 
 def fast_peer(t):
-    """The program, compiled if it is not there yet."""
+    """The path of the program, compiled at the first use."""
     if not os.path.exists("/usr/include/fastdds/dds/domain/DomainParticipant.hpp") or shutil.which("c++") is None:
         raise Skip("libfastrtps-dev or g++ is missing (scripts/install_tools check brings it)")
     program = os.path.join(os.path.abspath(t.build), "fast_peer")
     source = os.path.join(HERE, "fast_peer.cpp")
     if not os.path.exists(program) or os.path.getmtime(program) < os.path.getmtime(source):
         library = "fastrtps" if os.path.exists("/usr/include/fastrtps") else "fastdds"  # Version 2 or 3.
-        own = f"{program}.{os.getpid()}"  # Another scenario may compile it too.
+        own = f"{program}.{os.getpid()}"  # Another scenario may compile it in parallel.
         command = ["c++", "-std=c++17", "-O0", "-o", own, source, f"-l{library}", "-lfastcdr"]
         done = subprocess.run(command, capture_output=True, text=True, timeout=100, check=False)
         t.check(done.returncode == 0, f"it does not compile: {done.stderr[-600:]}")
@@ -35,70 +35,70 @@ def run_fast(ride, program, *words):
     return done.stdout
 
 
-@scenario("Fast DDS, another vendor's: hears the odometry, asks to arm, drives", 30)
+@scenario("Fast DDS of another vendor receives the odometry, requests to arm, drives", 30)
 def fast_dds(t):
     program = fast_peer(t)
     ride = Ride(t)
-    said = run_fast(ride, program, "0.3")
-    t.check("answer arm: done" in said, f"its question is answered: {said[-300:]}")
-    odom = re.search(r"odom odom base_link x (\S+) v (\S+)", said)
-    t.check(odom and float(odom[1]) > 0.2 and abs(float(odom[2]) - 0.3) < 0.1, f"it hears the odometry: {said[-300:]}")
+    output = run_fast(ride, program, "0.3")
+    t.check("answer arm: done" in output, f"its request gets a reply: {output[-300:]}")
+    odom = re.search(r"odom odom base_link x (\S+) v (\S+)", output)
+    t.check(odom and float(odom[1]) > 0.2 and abs(float(odom[2]) - 0.3) < 0.1, f"it receives the odometry: {output[-300:]}")
     t.check(len(ride.tap.twists) >= 25, f"{len(ride.tap.twists)} of 30 commands")
     t.figure(f"{len(ride.tap.twists)} of 30 commands, {odom[0] if odom else 'no odometry'}")
     ride.silence()
     t.judge(ride.rig)
 
 
-@scenario("Fast DDS calls the services: arm is answered, stop and estop stop, each call of a new client", 40)
+@scenario("Fast DDS calls the services: arm gets a reply, stop and estop stop, each call by a new client", 40)
 def fast_services(t):
     program = fast_peer(t)
     ride = Ride(t)
-    said = run_fast(ride, program, "iwheel/reset", "3")
-    t.check(said.count("reply 0") == 3 and said.count("not over the network") == 3, f"reset is refused with its reason, three times: {said}")
-    said = run_fast(ride, program, "iwheel/arm", "1")
-    t.check("reply 1" in said and "armed: send cmd_vel" in said, f"arm: {said}")
+    output = run_fast(ride, program, "iwheel/reset", "3")
+    t.check(output.count("reply 0") == 3 and output.count("not over the network") == 3, f"reset is refused with its reason, three times: {output}")
+    output = run_fast(ride, program, "iwheel/arm", "1")
+    t.check("reply 1" in output and "armed: send cmd_vel" in output, f"arm: {output}")
     ride.silence()
     stream = ride.driving()
-    said = run_fast(ride, program, "iwheel/stop", "1")
-    t.check("reply 1" in said, f"stop: {said}")
+    output = run_fast(ride, program, "iwheel/stop", "1")
+    t.check("reply 1" in output, f"stop: {output}")
     stream.stop()
     t.stopped_by(ride.client, "client_stop", "stopping")
     ride.silence()
     time.sleep(0.6)
     stream = ride.driving()
-    said = run_fast(ride, program, "iwheel/estop", "1")
-    t.check("reply 1" in said, f"estop: {said}")
+    output = run_fast(ride, program, "iwheel/estop", "1")
+    t.check("reply 1" in output, f"estop: {output}")
     t.check(ride.client.request("status")["state"] == "latched", "latched")
     stream.stop()
-    found = re.findall(r"reply \d after (\d+) ms", said)
+    found = re.findall(r"reply \d after (\d+) ms", output)
     t.figure(f"estop answered after {found[0] if found else '?'} ms")
     t.check("deserialization" not in ride.bridge.text(), f"nothing is undecodable: {ride.bridge.text()[-300:]}")
     t.judge(ride.rig)
 
 
 def called_late(ride, program, service, how="late"):
-    """What the program said, and when it called (us)."""
-    said = run_fast(ride, program, service, how)
-    called = re.search(r"called at (\d+) us", said)
-    ride.t.check(called and re.search(r"[1-9]\d* announcements left late", said), f"{service}: the request is there before its writer is known: {said}")
-    return said, int(called[1]) if called else 0
+    """The output of the program, and the time of its call (us)."""
+    output = run_fast(ride, program, service, how)
+    called = re.search(r"called at (\d+) us", output)
+    ride.t.check(called and re.search(r"[1-9]\d* announcements sent late", output), f"{service}: the request comes before its writer is known: {output}")
+    return output, int(called[1]) if called else 0
 
 
-@scenario("Fast DDS calls before the bridge knows the writer: stop and estop stop within 200 ms, arm is answered", 40)
+@scenario("Fast DDS calls before the bridge knows the writer: stop and estop stop within 200 ms, arm gets a reply", 40)
 def fast_calls_first(t):
     program = fast_peer(t)
     ride = Ride(t)
-    said, _ = called_late(ride, program, "iwheel/arm")
-    t.check("reply 1" in said and "armed: send cmd_vel" in said, f"arm: {said}")
+    output, _ = called_late(ride, program, "iwheel/arm")
+    t.check("reply 1" in output and "armed: send cmd_vel" in output, f"arm: {output}")
     ride.silence()
     for service, after in (("iwheel/stop", lambda speed: abs(speed) < 290), ("iwheel/estop", lambda speed: speed == 0)):
         stream = ride.driving()
-        said, called_us = called_late(ride, program, service)
-        t.check("reply 1" in said, f"{service}: {said}")
+        output, called_us = called_late(ride, program, service)
+        t.check("reply 1" in output, f"{service}: {output}")
         time.sleep(0.2)
         ms = t.first_after(ride.rig, called_us, after, f"the effect of {service}", 200)
         if ms is not None:
-            t.figure(f"{service}: {ms:.0f} ms, of which 50 it was unknown")
+            t.figure(f"{service}: {ms:.0f} ms, of which the writer was unknown for 50")
         stream.stop()
         if service == "iwheel/stop":
             ride.silence()
@@ -107,7 +107,7 @@ def fast_calls_first(t):
     t.judge(ride.rig)
 
 
-@scenario("Fast DDS keeps two stops of before the bridge was there, and calls before it is known: one stop within 200 ms", 40)
+@scenario("Fast DDS stores two stops from before the start of the bridge, and calls before the bridge knows it: one stop within 200 ms", 40)
 def fast_keeps(t):
     program = fast_peer(t)
     ride = Ride(t)
@@ -115,20 +115,20 @@ def fast_keeps(t):
     ride.bridge.end()
     ride.state.take()
     ride.silence()
-    command = [program, str(ride.domain), "iwheel/stop", "kept"]
+    command = [program, str(ride.domain), "iwheel/stop", "stored"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=ride.rig.folder) as child:
-        t.check("two are kept" in child.stdout.readline(), "two requests wait for nobody")
+        t.check("two are stored" in child.stdout.readline(), "two requests wait without a reader")
         before = len([event for event in ride.rig.timeline if event.kind == "stop"])
         ride.start_bridge()
-        said = child.communicate(timeout=30)[0]
-    t.check(re.search(r"[1-9]\d* announcements left late", said) and "reply 1" in said, said)
-    called = re.search(r"called at (\d+) us", said)
+        output = child.communicate(timeout=30)[0]
+    t.check(re.search(r"[1-9]\d* announcements sent late", output) and "reply 1" in output, output)
+    called = re.search(r"called at (\d+) us", output)
     time.sleep(0.5)
     stops = [event.t_us for event in ride.rig.timeline if event.kind == "stop"][before:]
-    if t.check(len(stops) == 1 and called, f"one stop is of now, not those before: {stops}, {said}"):
+    if t.check(len(stops) == 1 and called, f"one stop is current, not the earlier ones: {stops}, {output}"):
         ms = (stops[0] - int(called[1])) / 1000
         t.check(0 < ms < 200, f"{ms} ms after the call")
-        t.figure(f"{ms:.0f} ms after the call, of which 50 it was unknown")
+        t.figure(f"{ms:.0f} ms after the call, of which the writer was unknown for 50")
     t.judge(ride.rig)
 
 
@@ -139,8 +139,8 @@ def clients_come_and_go(t):
     stream = ride.driving()
     begin_us = now_us()
     for service in ("iwheel/stop", "iwheel/estop"):
-        said = run_fast(ride, program, service, "0")
-        t.check("100 clients" in said, f"{service}: {said}")
+        output = run_fast(ride, program, service, "0")
+        t.check("100 clients" in output, f"{service}: {output}")
         for _ in range(50):
             ride.peer.client(service)
             ride.peer.clients.clear()
@@ -152,7 +152,7 @@ def clients_come_and_go(t):
     t.judge(ride.rig)
 
 
-@scenario("ROS 2 Jazzy, its default vendor: a call of iwheel/estop stops within 200 ms; all services answer", 40)
+@scenario("ROS 2 Jazzy, its default vendor: a call of iwheel/estop stops within 200 ms; all services reply", 40)
 def jazzy_services(t):
     ride = Ride(t)
     jazzy = Jazzy(ride.domain)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The logic of iwheel_hardware, as ros2_control calls it, against the gateway. Its adapter (system.cpp) needs ros2_control and is not compiled here."""
+"""The logic of iwheel_hardware with the calls of ros2_control and the gateway. Its adapter (system.cpp) needs ros2_control and is not compiled here."""
 
 import os
 import shutil
@@ -34,7 +34,7 @@ def program(t):
 
 
 class Hardware:
-    """A rig, and a process that is the controller manager."""
+    """A rig, and a process that acts as the controller manager."""
 
     def __init__(self, t):
         self.t, self.rig = t, t.rig(PATIENT)
@@ -44,21 +44,21 @@ class Hardware:
         self.end_state = CLOSED
 
     def call(self, line, state=None, error=None):
-        """One call; it ends in this state, with an error that has these words (None: without)."""
+        """Makes one call; it must end in this state, with an error that contains these words (None: without an error)."""
         begin_us = now_us()
         self.child.stdin.write(line + "\n")
         self.child.stdin.flush()
-        said = self.child.stdout.readline().strip()
+        output = self.child.stdout.readline().strip()
         verb = line.split()[0]
         if verb in ("activate", "deactivate", "close"):
-            self.rig.timeline.append(Event(begin_us, {"activate": "arm"}.get(verb, "stop"), now_us(), "ok" in said))
+            self.rig.timeline.append(Event(begin_us, {"activate": "arm"}.get(verb, "stop"), now_us(), "ok" in output))
         if verb == "cycles" and not line.endswith(" 0 0"):
             self.rig.timeline.append(Event(begin_us, "drive", now_us(), True, 1, 1))
-        words = said.split(" ")
+        words = output.split(" ")
         good = "ok" in words
-        self.t.check(good == (error is None) and (error is None or error in said), f"{line}: {said}")
-        self.t.check(state is None or words[words.index("ok" if good else "error") + 1] == state, f"{line}: {said}")
-        return said
+        self.t.check(good == (error is None) and (error is None or error in output), f"{line}: {output}")
+        self.t.check(state is None or words[words.index("ok" if good else "error") + 1] == state, f"{line}: {output}")
+        return output
 
     def moving(self, since_us):
         return any(speed for _, _, speed in self.rig.bus.setpoints(since_us))
@@ -80,17 +80,17 @@ def lifecycle(t):
     begin_us = now_us()
     hardware.call(f"open {hardware.rig.path('gateway.sock')}", INACTIVE)
     hardware.call("cycles 20 5.0 5.0", INACTIVE)
-    t.rule(not hardware.moving(begin_us), "what is not active drives")
+    t.rule(not hardware.moving(begin_us), "an inactive interface drives")
     hardware.call("activate", ACTIVE)
     t.check(hardware.state() == "armed", "armed")
     hardware.call("activate", ACTIVE, "active already")
-    said = hardware.call("cycles 75 1.5 1.5", ACTIVE).split(" ")
-    t.check(hardware.moving(begin_us) and 0.5 < float(said[0]) < 3.0 and abs(float(said[2]) - 1.5) < 0.4, f"{said}")
+    output = hardware.call("cycles 75 1.5 1.5", ACTIVE).split(" ")
+    t.check(hardware.moving(begin_us) and 0.5 < float(output[0]) < 3.0 and abs(float(output[2]) - 1.5) < 0.4, f"{output}")
     hardware.call("deactivate", INACTIVE)
     hardware.listening()
     before_us = now_us()
     hardware.call("cycles 20 5.0 5.0", INACTIVE)
-    t.rule(not hardware.moving(before_us), "after deactivate it drives")
+    t.rule(not hardware.moving(before_us), "the interface drives after deactivate")
     hardware.close()
 
 
@@ -123,7 +123,7 @@ def errors(t):
     active()
     hardware.rig.sim.ask("mute left")
     hardware.call("cycles 60 1.0 1.0", CLOSED, "")
-    t.rule(hardware.state() != "armed", "a wheel offline, and it is armed")
+    t.rule(hardware.state() != "armed", "armed with an offline wheel")
     hardware.rig.gateway.signal(signal.SIGKILL)
     hardware.call(f"open {hardware.rig.path('gateway.sock')}", CLOSED, "no gateway")
     hardware.close()
@@ -143,6 +143,6 @@ def manager_dies(t):
         if number == signal.SIGSTOP:
             hardware.child.send_signal(signal.SIGCONT)
             hardware.call("cycles 5 1.5 1.5", CLOSED, "")
-            t.rule(not hardware.moving(now_us() - 100_000), "it goes on driving")
+            t.rule(not hardware.moving(now_us() - 100_000), "it continues to drive")
         hardware.child.kill()
         hardware.child.wait()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The bridge on the road: what ROS says is what the wheels do, and everything else stops them. Judged from the bus log."""
+"""The bridge in normal and disturbed operation: the wheels follow the commands of ROS, and every fault stops them. Judged from the bus log."""
 
 import math
 import os
@@ -32,7 +32,7 @@ MESSAGES = {
 def messages(t):
     ride = Ride(t, {"odometry": {"tf": "yes"}})
     t.check(ride.rig.wait_status(ride.client, lambda s: all(s[side]["force_validity"] == "valid" for side in ("left", "right")), 8), "a zero of the force")
-    readers = {name: ride.peer.reader(name, kind, kept=name == "iwheel/state") for name, kind in MESSAGES.items()}
+    readers = {name: ride.peer.reader(name, kind, transient=name == "iwheel/state") for name, kind in MESSAGES.items()}
     stream = ride.driving(0.3, 0.2, 2.2)
     stream.stop()
     for name, reader in readers.items():
@@ -41,7 +41,7 @@ def messages(t):
             continue
         for raw, message, _ in reader.all:
             again = bytes(ride.peer.store.serialize_cdr(message, reader.name))
-            # Behind the encapsulation, whose third and fourth byte tell here how many bytes fill up the last word.
+            # The third and fourth byte of the encapsulation contain the number of padding bytes in the last word.
             same = raw[:2] == again[:2] and again[4:] == raw[4 : len(again)] and raw[len(again) :] == bytes(-len(again) % 4)
             if not t.check(same, f"{name}: other bytes than ROS's: {raw.hex()} {again.hex()}"):
                 break
@@ -90,9 +90,9 @@ def odometry(t):
     x_m, y_m, psi = status["pose"]["x_mm"] / 1000, status["pose"]["y_mm"] / 1000, status["pose"]["psi_mrad"] / 1000
     t.check(
         abs(pose.position.x) > 0.5 and math.hypot(pose.position.x - x_m, pose.position.y - y_m) < 0.08,
-        f"{pose.position}, the wheel itself says {x_m} {y_m} {psi}",
+        f"{pose.position}, the wheel itself reports {x_m} {y_m} {psi}",
     )
-    t.figure(f"{pose.position.x:.2f} {pose.position.y:.2f} m, {yaw:.2f} rad; the wheel says {x_m:.2f} {y_m:.2f}, {psi:.2f}")
+    t.figure(f"{pose.position.x:.2f} {pose.position.y:.2f} m, {yaw:.2f} rad; the wheel reports {x_m:.2f} {y_m:.2f}, {psi:.2f}")
     t.judge(ride.rig)
 
 
@@ -131,20 +131,20 @@ def wheel_offline(t):
     t.judge(ride.rig, moves=False)
 
 
-@scenario("services: arm, stop, estop, reset; refused with the cure; the same by topic", 12)
+@scenario("services: arm, stop, estop, reset; refused with the fix; the same by topic", 12)
 def services(t):
     ride = Ride(t)
     stream = ride.driving()
-    ride.peer.client("iwheel/stop")  # To find each other is not part of what is timed.
+    ride.peer.client("iwheel/stop")  # Discovery is not part of the measured time.
     t_us = now_us()
     t.check(ride.peer.call("iwheel/stop") == (True, ""), "stop")
-    time.sleep(0.15)  # The answer can come before the next setpoint.
+    time.sleep(0.15)  # The reply can come before the next setpoint.
     ms = t.first_after(ride.rig, t_us, lambda speed: speed < 300, "the ramp begins", 200)  # A bridge may take 200 ms.
     t.figure(f"ramp after {ms or 0:.0f} ms")
     ride.silence()
-    t.check(ride.still(), "the stream goes on, the wheels do not")
+    t.check(ride.still(), "the stream continues, the wheels stay at standstill")
     refused = ride.peer.call("iwheel/arm")
-    t.check(refused and not refused[0] and "drive" in refused[1], f"nobody arms into a stream: {refused}")
+    t.check(refused and not refused[0] and "drive" in refused[1], f"arm during a stream is refused: {refused}")
     stream.stop()
     time.sleep(0.6)
     ride.arm()
@@ -152,13 +152,13 @@ def services(t):
     time.sleep(0.5)
     t.check(ride.peer.call("iwheel/estop") == (True, ""), "estop")
     refused = ride.peer.call("iwheel/arm")
-    t.check(refused and not refused[0] and "let go of the stick" in refused[1], f"the stream goes on: {refused}")
+    t.check(refused and not refused[0] and "let go of the stick" in refused[1], f"the stream continues: {refused}")
     stream.stop()
     time.sleep(0.6)
     refused = ride.peer.call("iwheel/arm")
     t.check(refused and not refused[0] and "reset" in refused[1], f"latched: {refused}")
     refused = ride.peer.call("iwheel/reset")
-    t.check(refused and not refused[0] and "allow_reset" in refused[1], f"reset is not for the network: {refused}")
+    t.check(refused and not refused[0] and "allow_reset" in refused[1], f"reset over the network is refused: {refused}")
     ask, answer = ride.peer.writer("iwheel/ask", "std_msgs/msg/String"), ride.peer.reader("iwheel/answer", "std_msgs/msg/String")
     ask.await_match()
     ask.write(ride.peer.make("std_msgs/msg/String", data="arm"))
@@ -168,7 +168,7 @@ def services(t):
     words = answer.wait(seconds=2)
     t.check(words and words.data == "stop: done", f"by topic: {words}")
     late = ride.peer.call("iwheel/arm", at_ns=time.time_ns() - 10**9)
-    t.check(late and not late[0] and "too late" in late[1], f"an old request to arm is none: {late}")
+    t.check(late and not late[0] and "too late" in late[1], f"an old request to arm is refused: {late}")
     t.judge(ride.rig)
 
 
@@ -198,20 +198,20 @@ def hostile_publishers(t):
     for message in bad * 5:
         writer.write(message)
         time.sleep(0.01)
-    t.check(not ride.tap.twists, f"nothing of it reaches the gateway: {ride.tap.twists[:3]}")
+    t.check(not ride.tap.twists, f"no hostile command reaches the gateway: {ride.tap.twists[:3]}")
     ride.silence()
     ride.arm()
     flood = ride.stream(0.25, writer=writer, every=0.001)
     time.sleep(1.5)
     flood.stop()
-    t.check(ride.moving(), "a flood drives as a stream does")
+    t.check(ride.moving(), "a flood drives like a stream")
     count = len(ride.tap.twists)
-    # Each a second old, in order: all from the past. Known by its speed: the last one of the flood may still be on its way.
+    # All are from the past: each a second old, in order. The speed identifies them, because the last command of the flood may still be in flight.
     old = Stream(writer, lambda: (ride.peer.twist(0.3), time.time_ns() - 10**9), 0.02)
     time.sleep(0.8)
     old.stop()
-    t.check(not [v for _, v, _ in ride.tap.twists if v == 300], "what is old is dropped")
-    t.check(ride.await_diagnosis("cmd_vel", "came too late", 2) == 1, "and told")
+    t.check(not [v for _, v, _ in ride.tap.twists if v == 300], "old commands are dropped")
+    t.check(ride.await_diagnosis("cmd_vel", "came too late", 2) == 1, "and reported")
     t.check(not ride.moving(now_us() - 100_000), "the wheels have stopped meanwhile")
     t.check(ride.bridge.resident_kB() < 40_000, f"{ride.bridge.resident_kB()} kB")
     t.figure(f"{count} of about 1500 passed on, {ride.bridge.resident_kB()} kB")
@@ -240,13 +240,13 @@ def publisher_dies(t):
     ride.peer.client("iwheel/arm")
     publisher = Process([sys.executable, "-c", DYING, str(ride.domain), here, here], ride.rig.path("publisher.out"))
     ride.rig.processes.append(publisher)
-    # It streams before anybody arms: refused, as a stream through a reset is.
+    # The stream begins before an arm: it is refused, as a stream during a reset is.
     end = time.monotonic() + 10
     while not ride.tap.twists and time.monotonic() < end:
         time.sleep(0.01)
     refused = ride.peer.call("iwheel/arm")
-    t.check(refused and not refused[0], f"a stream of before does not drive: {refused}")
-    t.check(ride.await_diagnosis("cmd_vel", "refused", 3) == 1, "told why the commands do nothing")
+    t.check(refused and not refused[0], f"an earlier stream does not drive: {refused}")
+    t.check(ride.await_diagnosis("cmd_vel", "refused", 3) == 1, "the reason for ignored commands is reported")
     publisher.signal(signal.SIGSTOP)
     time.sleep(0.7)
     ride.arm()
@@ -263,7 +263,7 @@ def publisher_dies(t):
     t.judge(ride.rig)
 
 
-@scenario("its source is silent for longer than timeout_ms: the bridge stops, once", 8)
+@scenario("its source sends nothing for longer than timeout_ms: the bridge stops, once", 8)
 def source_silent(t):
     ride = Ride(t, {"drive": {"timeout_ms": 100}}, {"drive": {"lease_ms": 400, "decel_mm_s2": 3000}})
     stream = ride.driving()
@@ -277,7 +277,7 @@ def source_silent(t):
     t.judge(ride.rig)
 
 
-@scenario("e-stop, lost lease, lost bus, lost gateway: seen within 0.2 s, each with its sentence; nothing starts by itself", 25)
+@scenario("e-stop, lost lease, lost bus, lost gateway: seen within 0.2 s, each with its sentence; nothing starts on its own", 25)
 def stops_are_seen(t):
     ride = Ride(t)
     figures = []
@@ -293,8 +293,8 @@ def stops_are_seen(t):
         t.check(any(part in text for text in words), f"{name}: {words}")
 
     def again():
-        """The stream went on all the time: nothing moves. After reset and silence it may."""
-        t.check(ride.still(0.5), "commands that kept coming start nothing")
+        """The stream has continued all the time: nothing moves. After reset and silence it may."""
+        t.check(ride.still(0.5), "continued commands start nothing")
         stream.stop()
         ride.reset()
         t.check(ride.still(0.7), "nothing after reset")
@@ -335,7 +335,7 @@ def stops_are_seen(t):
     time.sleep(1.2)
     ride.restart_gateway(wheels=False, restart_hold=True)
     t.check(ride.await_state(lambda s: s["gateway"] == "up", 4), "the bridge finds it again")
-    t.check(ride.still(0.6), "commands that kept coming start nothing")
+    t.check(ride.still(0.6), "continued commands start nothing")
     stream.stop()
     ride.silence()
     ride.arm()
@@ -379,19 +379,19 @@ def publishers_come_and_go(t):
         del one
         if number % 100 == 99:
             sizes.append(ride.bridge.resident_kB())
-    # DDS lets go of what is gone after some seconds: a saw, whose teeth are 0.9 MB high. Never letting go would be 2.6 MB.
+    # DDS releases entities some seconds after they are gone: the size is a sawtooth of 0.9 MB. Without any release it would grow by 2.6 MB.
     t.check(max(sizes[15:]) <= max(sizes[:15]) + 600, f"kB after each hundred: {sizes}")
     t.figure(f"{sizes[0]} to {max(sizes)} kB, {sizes[-1]} kB at the end")
     t.judge(ride.rig, moves=False)
 
 
-@scenario("the gateway hangs: seen within 0.2 s, and it takes nothing old when it wakes", 10)
+@scenario("the gateway hangs: seen within 0.2 s, and it accepts no old command when it wakes", 10)
 def gateway_hangs(t):
     ride = Ride(t)
     stream = ride.driving()
     ride.state.take()
     t_us = now_us()
-    # As the system tests note a process that stands still: it is dead meanwhile, and cuts as soon as it lives.
+    # The system tests treat a stopped process in the same way: it is dead meanwhile, and cuts as soon as it runs.
     ride.rig.note("cut", within_us=2_000_000)
     ride.rig.note("dead")
     ride.rig.gateway.signal(signal.SIGSTOP)
@@ -403,7 +403,7 @@ def gateway_hangs(t):
     ride.rig.gateway.signal(signal.SIGCONT)
     ride.rig.note("alive")
     t.check(ride.await_state(lambda s: s["gateway"] == "up", 3), "up again")
-    t.check(ride.still(0.5) and not ride.moving(back_us), "nothing but zeros, though commands keep coming")
+    t.check(ride.still(0.5) and not ride.moving(back_us), "only zeros, although commands continue")
     stream.stop()
     ride.reset()
     t.check(ride.still(0.3), "nothing after reset")
@@ -422,8 +422,8 @@ def bridge_killed(t):
     t.figure(f"ramp after {ms or 0:.0f} ms")
     ride.bridge.wait(2)
     ride.start_bridge()
-    t.check(ride.await_state(lambda s: s["gateway"] == "up"), "the new one is up")
-    t.check(ride.still(0.8), "the stream goes on, the wheels do not")
+    t.check(ride.await_state(lambda s: s["gateway"] == "up"), "the new bridge is up")
+    t.check(ride.still(0.8), "the stream continues, the wheels stay at standstill")
     stream.stop()
     ride.silence()
     t.judge(ride.rig)
@@ -457,7 +457,7 @@ def bridge_ends(t):
     t.judge(ride.rig)
 
 
-@scenario("auto_arm: after rest only, and not after a stop that was not its own", 16)
+@scenario("auto_arm: only after standstill, and not after a stop of another cause", 16)
 def auto_arm(t):
     ride = Ride(t, {"drive": {"auto_arm": "yes"}})
     time.sleep(0.6)
@@ -469,18 +469,18 @@ def auto_arm(t):
     time.sleep(0.6)
     stream = ride.stream(0.3, writer=stream.writer)
     time.sleep(0.8)
-    t.check(ride.moving(), "after silence of its own too")
+    t.check(ride.moving(), "after its own silence too")
     stream.stop()
     ride.silence()
-    t.check(ride.peer.call("iwheel/stop") == (True, ""), "a person stops a machine that stands")
+    t.check(ride.peer.call("iwheel/stop") == (True, ""), "a person stops a machine at standstill")
     time.sleep(1.2)
     stream = ride.stream(0.3, writer=stream.writer)
-    t.rule(ride.still(1.5), "the stream that comes after it arms")
+    t.rule(ride.still(1.5), "the next stream arms")
     stream.stop()
     time.sleep(1.2)
     stream = ride.stream(0.3, writer=stream.writer)
     time.sleep(0.8)
-    t.check(ride.moving(), "the source was silent: it arms again")
+    t.check(ride.moving(), "after silence of the source it arms again")
     ride.rig.press()
     ride.rig.release()
     stream.stop()
@@ -493,7 +493,7 @@ def auto_arm(t):
     ride.arm()
     stream = ride.stream(0.3, writer=stream.writer)
     time.sleep(0.5)
-    t.check(ride.moving(), "told, it drives")
+    t.check(ride.moving(), "after the service call it drives")
     stream.stop()
     ride.silence()
     t.judge(ride.rig)
@@ -509,7 +509,7 @@ def setpoint_role(t):
     t.check(ride.still(0.4) and not ride.tap.twists, "no command is passed on")
     stream.stop()
     t.check(odom.wait(), "odometry comes")
-    t.check(ride.await_diagnosis("cmd_vel", "carries no current") == 1, "told")
+    t.check(ride.await_diagnosis("cmd_vel", "carries no current") == 1, "reported")
     t.check("carries no current" in ride.bridge.text(), f"at start: {ride.bridge.text()}")
     t.judge(ride.rig, moves=False)
 
@@ -518,7 +518,7 @@ def setpoint_role(t):
 def names(t):
     for release, size in (("humble", 24), ("jazzy", 16)):
         ride = Ride(t, {"ros": {"release": release, "namespace": "w1", "node": "base"}, "drive": {"command": "twist_stamped"}})
-        graph = Reader(ride.peer, "ros_discovery_info", "rmw_dds_common/msg/ParticipantEntitiesInfo", kept=True)
+        graph = Reader(ride.peer, "ros_discovery_info", "rmw_dds_common/msg/ParticipantEntitiesInfo", transient=True)
         info = graph.wait()
         if t.check(info, f"{release}: no node in the graph"):
             node = info.node_entities_info_seq[0]
@@ -538,21 +538,21 @@ def names(t):
             stream = Stream(writer, lambda: ride.peer.twist_stamped(0.2, time.time_ns() - 10**9), 0.05)
             time.sleep(0.4)
             stream.stop()
-            t.check(not [v for _, v, _ in ride.tap.twists if v == 200], "what was stamped a second ago is dropped")
+            t.check(not [v for _, v, _ in ride.tap.twists if v == 200], "a command with a stamp of a second ago is dropped")
             ride.silence()
             t.judge(ride.rig)
         ride.bridge.end()
 
 
-@scenario("starts before the gateway; watches only where it is told; its command line", 12)
+@scenario("starts before the gateway; only watches where configured; its command line", 12)
 def starts(t):
     ride = Ride(t, {"drive": {"enabled": "no"}}, gateway=False)
-    t.check(ride.await_diagnosis("gateway", "gateway gone") == 2, "says that there is no gateway")
+    t.check(ride.await_diagnosis("gateway", "gateway gone") == 2, "reports the missing gateway")
     ride.restart_gateway()
-    t.check(ride.await_state(lambda s: s["gateway"] == "up", 4), "finds it when it comes")
+    t.check(ride.await_state(lambda s: s["gateway"] == "up", 4), "finds the gateway when it starts")
     answer = ride.peer.call("iwheel/arm")
     t.check(answer and not answer[0] and "enabled = no" in answer[1], f"{answer}")
-    t.check(ride.peer.call("iwheel/stop") == (True, ""), "stopping is for everybody")
+    t.check(ride.peer.call("iwheel/stop") == (True, ""), "every client may stop")
 
     def call(*arguments, **options):
         done = subprocess.run([ride.program(), *arguments], capture_output=True, text=True, timeout=10, check=False, **options)
@@ -581,7 +581,7 @@ def starts(t):
     t.judge(ride.rig, moves=False)
 
 
-@scenario("./demo --ros: a square by DDS messages from outside, back where it began", 30)
+@scenario("./demo --ros: a square by DDS messages from outside, back to its start", 30)
 def demo_square(t):
     root = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
     command = [sys.executable, os.path.join(root, "app", "demo", "ros.py"), "--build", t.build, "--plain"]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Every row of the table "What a user types" of the page for ROS 2, by a real ROS 2 against simulated wheels."""
+"""Every row of the table "What a user types" of the page for ROS 2, with a real ROS 2 and simulated wheels."""
 
 import math
 import os
@@ -14,51 +14,51 @@ from jazzy import ROOT, Jazzy, finish
 from ride import Ride, now_us
 from scenario import Skip, scenario
 
-SEEN_S = 12  # From a command as it is typed to what it does: Python starts, and DDS finds.
+SEEN_S = 12  # Limit from a typed command to its effect: Python starts, and DDS discovers.
 TRIGGER = "std_srvs/srv/Trigger"
-STAND_IN = "typed.py"  # Only it tells when it asked.
+STAND_IN = "typed.py"  # Only this program prints when it sent the request.
 
 
 def rows():
-    """{what is typed: what must happen}, as the page has them."""
+    """{typed command: expected results} of the page."""
     (page,) = [path for path in Path(ROOT, "docs").rglob("ros2.md") if "| What a user types |" in path.read_text(encoding="utf-8")]
     table = page.read_text(encoding="utf-8").split("| What a user types |", 1)[1].split("\n\n", 1)[0]
     return dict(re.findall(r"^\| `([^`]+)` \| (.+) \|$", table, re.MULTILINE))
 
 
 class Typed:
-    """A ride, and a person with a terminal."""
+    """A ride, and a person at a terminal."""
 
     def __init__(self, t, vendor="fastrtps", settings=None, **options):
         self.t, self.ride = t, Ride(t, settings, **options)
         self.jazzy = Jazzy(self.ride.domain, vendor)
 
     def expect(self, command, *parts, without=()):
-        said = self.jazzy.type(command)
-        missing = [part for part in parts if not re.search(part, said)]
-        self.t.check(not missing, f"{command}: {missing} is not in {said[-1500:]}")
-        self.t.check(not [part for part in without if re.search(part, said)], f"{command}: {said[-800:]}")
-        return said
+        output = self.jazzy.type(command)
+        missing = [part for part in parts if not re.search(part, output)]
+        self.t.check(not missing, f"{command}: {missing} is not in {output[-1500:]}")
+        self.t.check(not [part for part in without if re.search(part, output)], f"{command}: {output[-800:]}")
+        return output
 
     def call(self, verb, *parts):
         return self.expect(f"ros2 service call /iwheel/{verb} {TRIGGER}", *parts)
 
     def publishes(self, command, part, level, moves=False):
-        """/diagnostics says this while the command publishes."""
+        """Checks that /diagnostics contains this while the command publishes."""
         begin_us = now_us()
         child = self.jazzy.start(command)
-        self.t.check(self.ride.await_diagnosis("cmd_vel", part, SEEN_S) == level, f"{command}: /diagnostics does not say: {part}")
-        said = finish(child)
-        self.t.rule(self.ride.moving(begin_us) == moves, f"{command}: it moves without arm: {said[-300:]}")
+        self.t.check(self.ride.await_diagnosis("cmd_vel", part, SEEN_S) == level, f"{command}: /diagnostics does not contain: {part}")
+        output = finish(child)
+        self.t.rule(self.ride.moving(begin_us) == moves, f"{command}: it moves without arm: {output[-300:]}")
         time.sleep(0.7)
 
     def drives(self, command):
         begin_us = now_us()
         child = self.jazzy.start(command)
-        said = child.communicate(timeout=40)[0]
+        output = child.communicate(timeout=40)[0]
         moved = [t_us for t_us, _, speed in self.ride.rig.bus.setpoints(begin_us) if speed]
         seconds = (moved[-1] - moved[0]) / 1e6 if moved else 0
-        self.t.check(child.returncode == 0 and "and stopped" in said, f"{command}: {child.returncode} {said[-600:]}")
+        self.t.check(child.returncode == 0 and "and stopped" in output, f"{command}: {child.returncode} {output[-600:]}")
         self.t.check(1.7 < seconds < 3.2, f"{command}: the wheels were driven for {seconds:.1f} s", True, now_us())
         self.t.figure(f"driven for {seconds:.1f} s")
         self.ride.silence()
@@ -90,17 +90,17 @@ def graph(t, vendor):
     for command, parts in GRAPH.items():
         if "topic info" in command and "kilted" in typed.jazzy.folder:  # Fast DDS 3 does not find the node of a CycloneDDS writer.
             parts = tuple(part.replace("iwheel", "_CREATED_BY_BARE_DDS_APP_") for part in parts)
-        said = typed.expect(command, *parts)
+        output = typed.expect(command, *parts)
         if command == "ros2 topic echo --once /odom":
-            t.check(not re.search(r"\b(nan|inf)\b", said), f"finite numbers: {said[:400]}")
-    said = typed.jazzy.type("ros2 topic hz /odom", 8)
-    rate = re.findall(r"average rate: ([\d.]+)", said)
-    t.check(rate and abs(float(rate[-1]) - 50) < 5, f"hz: {said[-300:]}", True, now_us())
+            t.check(not re.search(r"\b(nan|inf)\b", output), f"finite numbers: {output[:400]}")
+    output = typed.jazzy.type("ros2 topic hz /odom", 8)
+    rate = re.findall(r"average rate: ([\d.]+)", output)
+    t.check(rate and abs(float(rate[-1]) - 50) < 5, f"hz: {output[-300:]}", True, now_us())
     typed.ride.rig.press()
     typed.expect("ros2 topic echo --once /iwheel/emergency_stop", r"data: true")
     typed.ride.rig.release()
-    said = typed.jazzy.type(["ROS_DOMAIN_ID=99", "ros2 node list"][1], ROS_DOMAIN_ID=str(free_domain()))
-    t.check("/iwheel" not in said, f"another domain: {said}")
+    output = typed.jazzy.type(["ROS_DOMAIN_ID=99", "ros2 node list"][1], ROS_DOMAIN_ID=str(free_domain()))
+    t.check("/iwheel" not in output, f"another domain: {output}")
     typed.ride.reset()
     t.judge(typed.ride.rig, moves=False)
 
@@ -113,9 +113,9 @@ def services(t, vendor):
     ride.silence()
     for verb, wanted in (("stop", lambda speed: speed < 300), ("estop", lambda speed: speed == 0)):
         stream = ride.driving()
-        said = typed.call(verb, r"success=True")
-        asked = re.search(r"requested at (\d+) us", said)
-        if asked:  # ros2cli does not say when it asked.
+        output = typed.call(verb, r"success=True")
+        asked = re.search(r"requested at (\d+) us", output)
+        if asked:  # ros2cli does not print when it sent the request.
             ms = t.first_after(ride.rig, int(asked[1]), wanted, f"the effect of {verb}", 200)
             t.figure(f"{verb}: {ms or 0:.0f} ms")
         t.check(not ride.moving(now_us() - 100_000) or verb == "stop", f"{verb}: zero")
@@ -209,10 +209,10 @@ def typed_drive(t):
     time.sleep(0.6)
     t.check(not typed.ride.moving(now_us() - 100_000), "Ctrl-C stops")
     t.stopped_by(typed.ride.client, "client_stop", typed.ride.client.request("status")["state"])
-    typed.ride.silence()  # An e-stop begins the hold of zero anew.
+    typed.ride.silence()  # An e-stop restarts the hold of zero.
     typed.ride.client.request("estop")
-    said = typed.jazzy.type(DRIVES[0])
-    t.check("iwheel/arm: " in said and "reset" in said, f"refused with the fix: {said[-300:]}")
+    output = typed.jazzy.type(DRIVES[0])
+    t.check("iwheel/arm: " in output and "reset" in output, f"refused with the fix: {output[-300:]}")
     t.judge(typed.ride.rig)
 
 
@@ -226,8 +226,8 @@ def table_is_whole(t):
 @scenario("without the profile, and from another domain, Fast DDS does not find the bridge", 20)
 def typed_without_profile(t):
     typed = Typed(t)
-    said = Jazzy(typed.ride.domain, profile=False).type("ros2 node list")
-    t.check("/iwheel" not in said, f"{said}")
+    output = Jazzy(typed.ride.domain, profile=False).type("ros2 node list")
+    t.check("/iwheel" not in output, f"{output}")
     typed.expect("ros2 node list", r"/iwheel")
     t.judge(typed.ride.rig, moves=False)
 
@@ -258,8 +258,8 @@ def typed_two_machines(t):
     keys = {tuple(line.split("|")) for line in done.stdout.splitlines()}
     t.check(len(keys) == 16 and {hardware for hardware, _ in keys} == {"iwheel", "w1/iwheel"}, f"{len(keys)} keys: {names} {done.stderr[-300:]}")
     begin_us = now_us()
-    said = typed.jazzy.type("python3 /usr/share/iwheel-ros2/drive.py 0.2 --for 1.5 --namespace w1", 40)
-    t.check("and stopped" in said and other.moving(begin_us), f"/w1 drives: {said[-300:]}")
+    output = typed.jazzy.type("python3 /usr/share/iwheel-ros2/drive.py 0.2 --for 1.5 --namespace w1", 40)
+    t.check("and stopped" in output and other.moving(begin_us), f"/w1 drives: {output[-300:]}")
     t.rule(not ride.moving(begin_us), "the other one does not")
     other.silence()
     t.judge(ride.rig, moves=False)
@@ -325,7 +325,7 @@ def gamepad_deadman(t):
     code = Path(ROOT, "share/ros2/iwheel_bringup/scripts/joystick.py").read_text(encoding="utf-8")
     pure = "import math\n" + code[code.index("ZEROS_S =") : code.index("class JoystickNode")]
     space = {}
-    exec(compile(pure, "joystick.py", "exec"), space)  # Without ROS.
+    exec(compile(pure, "joystick.py", "exec"), space)  # This part runs without ROS.
     pad = space["Deadman"](2.0)
     pad.report(True, 0.4, 0.0, 0.0)
     t.check(pad.step(0.1) is None, "held from the start: nothing")
@@ -340,7 +340,7 @@ def gamepad_deadman(t):
     pad.report(True, 0.2, 0.0, 3.4)
     t.check(pad.step(3.5) == (0.2, 0.0), "released and held again")
     pad.report(True, math.nan, 0.0, 3.6)
-    t.check(pad.step(3.7) == (0.0, 0.0), "an axis that is not there ends it")
+    t.check(pad.step(3.7) == (0.0, 0.0), "a missing axis ends it")
     for wrong in (0.0, -1.0, 2.1, math.nan):
         try:
             space["Deadman"](wrong)
@@ -349,7 +349,7 @@ def gamepad_deadman(t):
             pass
 
 
-@scenario("the gamepad node as a node: drives by joy, stops when the gamepad is silent with the button held", 30)
+@scenario("the gamepad node as a node: drives by joy, stops when the gamepad sends nothing with the button held", 30)
 def gamepad_node(t):
     typed = Typed(t)
     ride = typed.ride

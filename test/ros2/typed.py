@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Run by ROS 2's own Python: carries out commands of `ros2` as ros2cli does, through rclpy, where ros2cli itself is not installed.
+"""Run by ROS 2's own Python: carries out commands of `ros2` like ros2cli, through rclpy, if ros2cli itself is not installed.
 
-usage: typed.py WORD...     the words after `ros2`; options as those of ros2cli that docs/user/ros2.md uses. The printed lines are those of ros2cli.
+usage: typed.py WORD...     the words after `ros2`; options of ros2cli that docs/user/ros2.md uses. The printed lines are those of ros2cli.
 """
 
 import argparse
@@ -24,7 +24,7 @@ def interface(name):
 
 
 def fill(message, values):
-    """The fields of a YAML mapping, however deep."""
+    """The fields of a YAML mapping at any depth."""
     for name, value in (values or {}).items():
         if isinstance(value, dict):
             fill(getattr(message, name), value)
@@ -86,7 +86,7 @@ def await_type(node, topic):
 
 
 def listen(node, options, react):
-    """Subscribes with the QoS of the first publisher, as ros2cli does, or as asked."""
+    """Subscribes with the QoS of the first publisher, as ros2cli does, or with the requested one."""
     topic = options.words[0]
     kind = await_type(node, topic)
     spin(node, WAIT_S, lambda: node.get_publishers_info_by_topic(topic))

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// A board without a board: the image `gateway`'s own code for its host (app/board), with the same core, on this machine's
-// clock, with the simulator's wheels and with descriptor 0 for its serial line.
+// A board on this machine: the code of the image `gateway` for its host (app/board), with the same core, this machine's
+// clock, the simulator's wheels, and descriptor 0 as its serial line.
 //
 //     serial_board CONFIGURATION BUS ESTOP [restarted]
 //
-// SIGHUP resets it: another start, another boot, as if somebody had pressed the button of a board that was sending.
+// SIGHUP resets it: the next start has another boot, as after a press of the reset button of a board that was sending.
 #include "box/box.h"
 #include "config/gateway_config.h"
 #include "wheels/wheels.h"
@@ -33,19 +33,19 @@ static const char *lent;
 static size_t lent_left;
 static bool line_ended;
 
-/// The image asks byte by byte.
+/// The image reads byte by byte.
 size_t brd_serial_read(char *out, size_t size) {
-    static char taken[4096];
+    static char input[4096];
     static size_t at;
     static size_t end;
     if (at == end) {
-        const ssize_t count = read(STDIN_FILENO, taken, sizeof taken);
+        const ssize_t count = read(STDIN_FILENO, input, sizeof input);
         line_ended = line_ended || count == 0;
         at = 0;
         end = (count > 0) ? (size_t)count : 0U;
     }
     const size_t left = (end - at < size) ? end - at : size;
-    memcpy(out, &taken[at], left);
+    memcpy(out, &input[at], left);
     at += left;
     return left;
 }
@@ -84,14 +84,14 @@ bool brd_serial_is_idle(void) {
     return waits == 0U && lent_left == 0U;
 }
 
-/// True if all of it went.
+/// Writes bytes. Returns true if all were written.
 static bool put(const char *bytes, size_t *left) {
     const ssize_t count = (*left > 0U) ? write(STDIN_FILENO, bytes, *left) : 0;
     *left -= (count > 0) ? (size_t)count : 0U;
     return *left == 0U;
 }
 
-/// A line that is begun is ended before another one: of the two sources one at a time.
+/// Writes whole lines: a line is completed before a line of the other source begins.
 void brd_serial_step(void) {
     static bool in_lent;
     if (!in_lent) {
@@ -121,7 +121,7 @@ static gw_box_t box;
 static gw_wheels_t wheels;
 static brd_host_t host;
 
-/// There is no flash here: a configuration lives as long as the file it was read from.
+/// This board has no flash: a configuration lives as long as the file from which it was read.
 bool brd_host_keep(const brd_settings_t *settings) {
     (void)settings;
     return false;
@@ -168,7 +168,7 @@ static void begin(char **arguments, bool restarted) {
     brd_host_init(&host, &place, wheels.now_us);
 }
 
-/// As cycle() of the image's main.c.
+/// One cycle, like cycle() of the image's main.c.
 static iw_time_us_t cycle(void) {
     wheels.now_us = iwl_clock_now_us();
     iwl_hal_poll(&wheels.hal, wheels.now_us);
@@ -194,7 +194,7 @@ int main(int argc, char **argv) {
                                    {.fd = iwl_hal_bus_fd(&wheels.hal), .events = POLLIN},
                                    {.fd = iwl_hal_estop_fd(&wheels.hal), .events = POLLIN}};
         entries[0].events = (short)(POLLIN | (brd_serial_is_idle() ? 0 : POLLOUT));
-        // At most 1 ms, as the image wakes for each frame and by its timer.
+        // Waits at most 1 ms, because the image wakes for each frame and by its timer.
         (void)poll(entries, 3, (next_us > now_us + 1000U) ? 1 : 0);
         if (reset_pressed != 0) {
             char *again[] = {argv[0], argv[1], argv[2], argv[3], gw_wheels_are_sent_to(&wheels) ? "restarted" : NULL,

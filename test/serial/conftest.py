@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The relay to a board: judged from the bus log, as the system tests, whatever happens to cable, relay, board and clients.
+"""The relay to a board, judged from the bus log like the system tests, during faults of cable, relay, board and clients.
 
-test_wires.py: the board is the image's own code on this machine (board.c). test_image.py: nothing but what is shipped, the real image on an emulated CPU,
-its UART on a pseudo terminal; IWHEEL_BOARD=stm32f407 or stm32f446 takes another board's image. Needs arm-none-eabi-gcc and the Python package unicorn.
+test_wires.py: the board is the image's own code on this machine (board.c). test_image.py: only shipped code, the real image on an emulated CPU with
+its UART on a pseudo terminal; IWHEEL_BOARD=stm32f407 or stm32f446 selects another board's image. Needs arm-none-eabi-gcc and the Python package unicorn.
 """
 
 import importlib.machinery
@@ -26,7 +26,7 @@ def rig_type():
 
 
 def pytest_collection_finish(session):
-    """Builds the image as it is flashed; tests find it by the environment."""
+    """Builds the image as for flashing; environment variables pass it to the tests."""
     if session.config.option.collectonly or not any(item.path.name == "test_image.py" for item in session.items):
         return
     emulate = importlib.machinery.SourceFileLoader("emulate", str(ROOT / "app/demo/emulate")).load_module()

@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""A board for the relay's tests: the real image `gateway` on the emulated CPU, with two wheels, in the time of the wall.
+"""A board for the relay's tests: the real image `gateway` on the emulated CPU, with two wheels, in real time.
 
 usage: image.py BOARD IMAGE LIBRARY LINK_FD      (the serial line is descriptor 0, the rig is at the other end of LINK_FD)
 
-Told, a word a line: press, release (the e-stop's contact), reset (the pin), hang (the main loop goes round on one spot). Tells, V being the
+Input, one word per line: press, release (the e-stop's contact), reset (the pin), hang (the main loop runs in place). Output, V being the
 board's own microseconds: `T WALL V` a slice begins, `F V ID HEX` a frame was on the bus, `E V KIND WITHIN` for the judge's timeline, `X TEXT`
-the image did what the chip forbids.
+the image did something that the chip forbids.
 
-A machine that is too busy for it makes the board's time pass more slowly, and nothing is late in that time: so it is the one to judge by.
+On a busy machine the board's time passes more slowly, and nothing is late in that time, so the tests judge in the board's time.
 """
 
 import contextlib
@@ -29,18 +29,18 @@ from emulator.machine import Machine
 
 BAUD = 1_000_000
 SLICE_NS = 2_000_000
-BEHIND_MAX_NS = 20_000_000  # More is not made up for.
-WAITING_MAX = 256  # Bytes from the host that the adapter has taken; the others wait where they come from.
+BEHIND_MAX_NS = 20_000_000  # A longer delay is not made up for.
+WAITING_MAX = 256  # Bytes from the host that the adapter buffers; further bytes wait in the socket.
 SENDING_NS = 60_000_000  # Three periods.
-RESTART_US = 300_000  # As the system tests: zeros are due this soon after a start that follows motion.
+RESTART_US = 300_000  # As in the system tests: zeros are due this soon after a start that follows motion.
 
 
 class Board:
-    """The machine and what it is joined to."""
+    """The machine and its connections."""
 
     def __init__(self, machine, line, link):
         self.machine, self.line, self.link = machine, line, link
-        self.words, self.unread, self.news, self.resets, self.told = b"", b"", [], 0, 0
+        self.words, self.unread, self.news, self.resets, self.reported = b"", b"", [], 0, 0
         self.sent_ns, self.was_sending = None, False
 
     def now_us(self):
@@ -62,8 +62,8 @@ class Board:
             machine.divert()
             self.happened("end")
 
-    def take(self):
-        """What came from the host and from the rig meanwhile. False: the rig has gone."""
+    def receive(self):
+        """Reads input from the host and from the rig. Returns False if the rig has gone."""
         uart = self.machine.uart
         try:
             if len(uart.typed) < WAITING_MAX:
@@ -79,8 +79,8 @@ class Board:
             self.obey(word.decode())
         return bool(more)
 
-    def tell(self):
-        """What the chip said goes on, and what happened to the rig."""
+    def report(self):
+        """Passes on the output of the chip, and reports events to the rig."""
         machine = self.machine
         self.unread = (self.unread + bytes(machine.uart.sent))[-65536:]
         machine.uart.sent.clear()
@@ -95,8 +95,8 @@ class Board:
         self.sent_ns = next((frame.time_ns for frame in reversed(machine.bus.log) if frame.sender == "chip"), self.sent_ns)
         machine.bus.log.clear()
         machine.bus.attempts = 0
-        self.news += [f"X {text}" for text in machine.violations[self.told :]]
-        self.told = len(machine.violations)
+        self.news += [f"X {text}" for text in machine.violations[self.reported :]]
+        self.reported = len(machine.violations)
         self.link.setblocking(True)
         self.link.sendall("".join(f"{line}\n" for line in self.news).encode())
         self.link.setblocking(False)
@@ -104,11 +104,11 @@ class Board:
 
     def run(self):
         due_ns = time.monotonic_ns()
-        while self.take():
+        while self.receive():
             now_ns = time.monotonic_ns()
             self.news.insert(0, f"T {now_ns // 1000} {self.now_us()}")
             self.machine.run(SLICE_NS)
-            self.tell()
+            self.report()
             due_ns = max(due_ns + SLICE_NS, now_ns - BEHIND_MAX_NS)
             time.sleep(max(0, due_ns - time.monotonic_ns()) / 1e9)
 
@@ -120,9 +120,9 @@ def main(board, image, library, link_fd):
     line, link = socket.socket(fileno=0), socket.socket(fileno=int(link_fd))
     line.setblocking(False)
     link.setblocking(False)
-    with contextlib.suppress(ConnectionError):  # The rig has ended.
+    with contextlib.suppress(ConnectionError):  # The rig may have ended.
         Board(machine, line, link).run()
-    os._exit(0)  # Nothing to be kept, and the emulator's own end takes its time.
+    os._exit(0)  # There is nothing to store, and the emulator ends slowly.
 
 
 if __name__ == "__main__":

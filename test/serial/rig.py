@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A rig in which a board takes the gateway's place: wheels, board, a cable that can do anything a cable does, and the relay."""
+"""A rig with a board instead of the gateway: wheels, board, a cable with all faults of a cable, and the relay."""
 
 import os
 import pty
@@ -24,16 +24,16 @@ def framed(text):
 
 
 class Cable(threading.Thread):
-    """Between the relay's port (a pseudo terminal, `path` links to it) and the board (a socket). `up` and `down` may change what passes:
-    each gets bytes and returns bytes. `held`: the board takes nothing, and nothing comes from it."""
+    """Connects the relay's port (a pseudo terminal, `path` links to it) and the board (a socket). `up` and `down` may change the bytes:
+    each receives bytes and returns bytes. `held`: the cable transports nothing in either direction."""
 
     def __init__(self, path, board):
         super().__init__(daemon=True)
         self.path, self.board = path, board
         self.up = self.down = None
         self.held, self.over = False, False
-        self.cut_after = None  # Bytes that still pass to the board before the plug is pulled.
-        self.heard, self.told = bytearray(), bytearray()  # From the relay, from the board.
+        self.cut_after = None  # Bytes that still reach the board before the plug is pulled.
+        self.from_relay, self.from_board = bytearray(), bytearray()  # All bytes from the relay and from the board.
         self.lock = threading.RLock()
         self.master = self.slave = None
         self.plug()
@@ -55,13 +55,13 @@ class Cable(threading.Thread):
                 os.close(self.slave)
                 self.master = self.slave = None
 
-    def say(self, data):
-        """To the relay, as if the board had said it."""
+    def send_to_relay(self, data):
+        """Sends bytes to the relay as if from the board."""
         with self.lock:
             self.write(data)
 
     def write(self, data):
-        """As slow as the relay reads; what it does not read within a while is lost, as on any cable."""
+        """Writes as fast as the relay reads; bytes that it does not read within a while are lost, as on any cable."""
         end = time.monotonic() + 0.2
         while data and self.master is not None and time.monotonic() < end:
             try:
@@ -70,8 +70,8 @@ class Cable(threading.Thread):
                 time.sleep(0.001)
 
     def ask(self, data):
-        """To the board, as if the relay had said it."""
-        with self.lock:  # A line of the relay's comes before it or after it.
+        """Sends bytes to the board as if from the relay."""
+        with self.lock:  # A line of the relay comes before or after these bytes.
             self.board.sendall(data)
 
     def run(self):
@@ -88,7 +88,7 @@ class Cable(threading.Thread):
     def carry(self, source):
         if source is self.board:
             data = self.board.recv(65536)
-            self.told += data
+            self.from_board += data
             self.write(self.down(data) if self.down else data)
             self.over = self.over or not data
             return
@@ -100,7 +100,7 @@ class Cable(threading.Thread):
             return
         if self.cut_after is not None:
             data, self.cut_after = data[: self.cut_after], max(0, self.cut_after - len(data))
-        self.heard += data
+        self.from_relay += data
         try:
             self.board.sendall(self.up(data) if self.up else data)
         except OSError:
@@ -120,7 +120,7 @@ class SerialRig(Rig):
     """`start_gateway` starts board, cable and relay; clients connect to the relay's sockets."""
 
     cable = board = None
-    # For any machine, however busy: what is judged here is the line.
+    # These limits fit any machine, however busy: the tests judge the serial line.
     PATIENT = {"limits": {"wheel_silent_ms": 200, "echo_ms": 200}}
 
     def __init__(self, build, config=None, **options):
@@ -161,7 +161,7 @@ class SerialRig(Rig):
         return self.gateway
 
     def await_relay(self, text, seconds=4.0):
-        """Until this relay, not one before it, has said this; False after that time."""
+        """Waits until this relay, not an earlier one, has printed this. Returns False after that time."""
         end = time.monotonic() + seconds
         while text not in self.gateway.text()[self.said_before :]:
             if time.monotonic() > end:
@@ -190,11 +190,11 @@ class SerialRig(Rig):
         return [t_us for t_us, _, speed in self.bus.setpoints(since_us) if speed]
 
     def times(self, count):
-        """How often something is repeated."""
+        """The number of repetitions."""
         return count
 
     def note_after(self, wait_us, kind, **fields):
-        """On the timeline, so much later than now."""
+        """Adds an event to the timeline at a later time."""
         self.timeline.append(Event(now_us() + wait_us, kind, **fields))
 
     def close(self, keep=False):
@@ -204,7 +204,7 @@ class SerialRig(Rig):
 
 
 def mutated(line, chance):
-    """A line as a bad wire would have it: bytes turned, cut, doubled, joined with itself."""
+    """The line as after a bad wire: bytes changed, cut, doubled, or joined with itself."""
     kind = chance.randrange(5)
     data = bytearray(line)
     at = chance.randrange(len(data))
@@ -217,7 +217,7 @@ def mutated(line, chance):
         data = data[:at] + data + b"\n"
     elif kind == 3:
         data[at:at] = bytes(chance.randrange(256) for _ in range(1 + chance.randrange(6)))
-    return bytes(data)  # Kind 4: the very same, too late.
+    return bytes(data)  # Kind 4: unchanged, but too late.
 
 
 __all__ = ["Cable", "SerialRig", "framed", "mutated", "random"]

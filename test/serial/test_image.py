@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Scenarios of test_wires.py with the real image in the board's place, and those that only it can play: its e-stop pin and its resets."""
+"""Scenarios of test_wires.py with the real image as the board, and scenarios that only the image can play: its e-stop pin and its resets."""
 
 import bisect
 import contextlib
@@ -26,17 +26,17 @@ from scenario import scenario
 from test_wires import await_service, begin, cable_pulled, client_killed, end_well, raw_drive, relay_killed, relay_stopped, tool  # noqa: F401
 
 HERE = os.path.dirname(os.path.abspath(__file__))
-SLICE_US = 2000  # As image.py.
-STALL_US = 30_000  # The machine did not run the board for so long.
+SLICE_US = 2000  # As in image.py.
+STALL_US = 30_000  # A time without running the board counts as a stall from this duration.
 
 
 class BoardBus(threading.Thread):
-    """What the board tells of its bus (image.py), in the board's time: `time_of` tells it for a moment of ours."""
+    """The board's reports about its bus (image.py), in the board's time; `time_of` converts this machine's time."""
 
     def __init__(self, link):
         super().__init__(daemon=True)
         self.link, self.frames, self.errors, self.events, self.forbidden = link, [], [], [], []
-        self.walls, self.boards = [], []  # When a slice began: by our clock, by its own.
+        self.walls, self.boards = [], []  # Begin of each slice in this machine's time and in the board's.
         self.closed = False
         self.start()
 
@@ -51,14 +51,14 @@ class BoardBus(threading.Thread):
                 return
             *lines, rest = (rest + new).split(b"\n")
             for line in lines:
-                self.take(*line.decode().split(" ", 1))
+                self.receive(*line.decode().split(" ", 1))
 
-    def take(self, kind, text):
+    def receive(self, kind, text):
         if kind == "T":
             wall, board = map(int, text.split())
             if not self.walls:
                 self.base = wall - board
-            self.boards.append(board + self.base)  # Before its other half, by which it is found.
+            self.boards.append(board + self.base)  # Append this before `walls`, because `time_of` searches `walls`.
             self.walls.append(wall)
         elif kind == "F":
             t_us, number, data = text.split(" ")
@@ -77,7 +77,7 @@ class BoardBus(threading.Thread):
         return [(b, b - a) for a, b in zip(self.walls, self.walls[1:], strict=False) if b - a > STALL_US]
 
     def setpoints(self, since_us=0):
-        """As Bus.setpoints, of a moment of ours."""
+        """As Bus.setpoints, from a time of this machine."""
         since = self.time_of(since_us) if since_us else 0
         return [(f.t_us, f.id, signed(f.data, 1)) for f in list(self.frames) if f.id in (266, 298) and f.t_us >= since and len(f.data) >= 3]
 
@@ -86,11 +86,11 @@ class BoardBus(threading.Thread):
 
 
 class ImageBoard:
-    """The process of image.py: in the simulator's place the wheels, and the board too."""
+    """The process of image.py: it replaces the simulator's wheels and the board."""
 
     def __init__(self, rig):
         self.uart, theirs = socket.socketpair()
-        self.uart.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)  # As much as a tty holds.
+        self.uart.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)  # The buffer size of a tty.
         self.link, link = socket.socketpair()
         command = [
             sys.executable,
@@ -104,7 +104,7 @@ class ImageBoard:
         theirs.close()
         link.close()
 
-    def say(self, word):
+    def send(self, word):
         self.link.sendall(f"{word}\n".encode())
 
     def end(self):
@@ -113,7 +113,7 @@ class ImageBoard:
 
 
 class ImageRig(SerialRig):
-    """Judged in the board's time: a busy machine makes it pass more slowly, and excuses nothing."""
+    """Judged in the board's time: a busy machine makes it pass more slowly and excuses nothing."""
 
     def start_wheels(self, sim_args):
         return ImageBoard(self)
@@ -126,7 +126,7 @@ class ImageRig(SerialRig):
         self.cable = Cable(self.path("port"), self.sim.uart)
 
     def pass_time(self, seconds):
-        """Of the board's."""
+        """Waits this long in the board's time."""
         end_us = self.bus.time_of(now_us()) + seconds * 1e6
         while self.bus.time_of(now_us()) < end_us and self.board.child.poll() is None:
             time.sleep(0.005)
@@ -138,10 +138,10 @@ class ImageRig(SerialRig):
         self.bus.events.append(Event(self.bus.time_of(now_us()) + wait_us, kind, **fields))
 
     def press(self):
-        self.sim.say("press")
+        self.sim.send("press")
 
     def release(self):
-        self.sim.say("release")
+        self.sim.send("release")
 
     def judge(self, moves=True, **options):
         self.pass_time(0.05)
@@ -158,7 +158,7 @@ class ImageRig(SerialRig):
             **options,
         )
         judge.judge()
-        judge.found += [Violation("chip", 0, f"the image did what the chip forbids: {text}", False) for text in self.bus.forbidden]
+        judge.found += [Violation("chip", 0, f"the image did something that the chip forbids: {text}", False) for text in self.bus.forbidden]
         judge.bus_stalls, judge.machine_stalls = list, self.bus.stalls
         return judge
 
@@ -210,7 +210,7 @@ def estop_pin(t):
     end_well(t, rig, client)
 
 
-@scenario("both resets in motion: zeros first, all clients are closed, and what they say after it is obeyed by no one", 14)
+@scenario("both resets in motion: zeros first, all clients are closed, and no later command of them is obeyed", 14)
 def resets(t):
     rig, client = begin(t)
     boots = [rig.gateway.text().rsplit(": start ", 1)[-1].split(",")[0]]
@@ -218,7 +218,7 @@ def resets(t):
         watcher = rig.watcher()
         watcher.wait_event("hello")
         t.drive_for(client, 250, 250, 0.5)
-        rig.sim.say(way)
+        rig.sim.send(way)
         closed = 0
         for one in (client, watcher):
             try:
@@ -233,13 +233,13 @@ def resets(t):
         t.expect(client.drive(100, 100), "not_armed")
         t.check(rig.wait_status(client, lambda s: s["state"] == "listening" and s["left"]["at_rest"], 8), "listening")
         t.arm(client)
-    t.check(len(set(boots)) == 3 and all(len(boot) == 16 for boot in boots), f"each start has a name of its own: {boots}")
+    t.check(len(set(boots)) == 3 and all(len(boot) == 16 for boot in boots), f"each start has a different name: {boots}")
     t.drive_for(client, 150, 150, 0.3)
     t.expect(client.request("stop"))
     end_well(t, rig, client)
 
 
-@scenario("configured and taught by iwheelctl and the Python client: what is kept is there after a reset", 12)
+@scenario("configured by iwheelctl and the Python client: stored values survive a reset", 12)
 def kept(t):
     rig, client = t.running()
     t.check(run_tool(t, rig, "config", "set", "drive.lease_ms", "300")["staged"], "staged")
@@ -249,15 +249,15 @@ def kept(t):
     tared = run_tool(t, rig, "tare", "left")["left"]["offset_mN"]
     rig.pass_time(2.5)
     t.check(run_tool(t, rig, "status")["memory"]["state"] == "kept", "kept")
-    t.check(run_tool(t, rig, "config", "commit")["restarts"], "a start with it")
+    t.check(run_tool(t, rig, "config", "commit")["restarts"], "a restart with the new value")
     with contextlib.suppress(wires.Closed, OSError):
         t.check(client.wait_event("nothing", 3.0), "its clients are closed")
     await_service(t, rig).close()
     with Gateway(rig.path("gateway.sock"), wait=3.0) as gateway:
         keys = {entry["key"]: entry["value"] for entry in gateway.config()["keys"]}
         t.check(keys["drive.lease_ms"] == "300" and keys["wheels.setpoint_type"] == "1", f"{keys}")
-        t.check(gateway.config("drive.lease_ms", 200)["staged"] and not gateway.config(commit=False)["staged"], "staged and forgotten")
-    rig.sim.say("reset")
+        t.check(gateway.config("drive.lease_ms", 200)["staged"] and not gateway.config(commit=False)["staged"], "staged and discarded")
+    rig.sim.send("reset")
     rig.pass_time(1.0)
     client = await_service(t, rig)
     status = client.request("status")
@@ -266,13 +266,13 @@ def kept(t):
     t.check((left["offset_origin"], left["force_offset_mN"], left["offset_provenance"]) == ("operator", tared, "stored"), f"{left}")
     t.check(status["lease"]["lease_ms"] == 300, "configured")
     command = [rig.program("iwheelctl"), "--socket", rig.path("gateway.sock"), "ledger"]
-    told = " ".join(subprocess.run(command, capture_output=True, text=True, timeout=20, check=False).stdout.split())
-    t.check("wheel_radius: confirmed by the operator" in told and "track: configured, not verified" in told, told)
+    output = " ".join(subprocess.run(command, capture_output=True, text=True, timeout=20, check=False).stdout.split())
+    t.check("wheel_radius: confirmed by the operator" in output and "track: configured, not verified" in output, output)
     t.judge(rig, moves=False)
 
 
 def run_tool(t, rig, *words, code=0):
-    """iwheelctl against the relay; its reply."""
+    """Runs iwheelctl with the relay and returns its reply."""
     command = [rig.program("iwheelctl"), "--socket", rig.path("gateway.sock"), "--json", *words]
     done = subprocess.run(command, capture_output=True, text=True, timeout=20, check=False)
     t.check(done.returncode == code, f"iwheelctl {' '.join(words)}: {done.returncode} {done.stdout} {done.stderr}")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What can happen between a client and a board: nothing is obeyed late, and every end of the chain stops the wheels."""
+"""Faults between a client and a board: no command is obeyed late, and every broken part stops the wheels."""
 
 import contextlib
 import json
@@ -24,7 +24,7 @@ SEEN_US = 60_000  # the bus log has what happened until then
 
 
 def begin(t, **options):
-    """A rig that runs, and an armed client."""
+    """Starts a rig and arms a client."""
     rig, client = t.running(**options)
     t.arm(client)
     return rig, client
@@ -55,7 +55,7 @@ def end_well(t, rig, client=None):
     t.judge(rig)
 
 
-@scenario("a client drives, watches and stops through the relay, and gets what a gateway gives", 5)
+@scenario("a client drives, watches and stops through the relay, and gets the replies of a gateway", 5)
 def drive(t):
     rig, client = begin(t)
     t.check(client.events or client.collect(0.1), "a hello on connecting")
@@ -68,7 +68,7 @@ def drive(t):
     tell_speed(t, rig, client)
     t.expect(other.drive(100, 100), "not_holder")
     t.expect(client.request("stop"))
-    t.check(other.wait_event("stop"), "the stop is told to who watches")
+    t.check(other.wait_event("stop"), "the watcher receives the stop")
     t.check(client.request("why")["cause"] == "client_stop", "why")
     t.expect(client.request("recordings"), "denied")
     client.send_raw(b'{"cmd":"drive","id":"x"}\n{"cmd":"nothing","id":7}\n{"id":8,"cmd":"hello" }\nnonsense\n')
@@ -79,7 +79,7 @@ def drive(t):
 
 
 def tell_speed(t, rig, client):
-    """How long a command takes to its answer, and what the relay costs meanwhile, with 20 commands a second and a watcher."""
+    """Measures the time from a command to its reply and the relay's processor time, with 20 commands a second and a watcher."""
     spans_us, begin_s, begin_us = [], rig.gateway.cpu_seconds(), now_us()
     for _ in range(40):
         sent_us = now_us()
@@ -92,7 +92,7 @@ def tell_speed(t, rig, client):
     )
 
 
-@scenario("a client that is killed while it drives ends its lease at once", 3)
+@scenario("a client that is killed while it drives loses its lease immediately", 3)
 def client_killed(t):
     rig, client = begin(t)
     t.drive_for(client, 250, 250, 0.6)
@@ -101,18 +101,18 @@ def client_killed(t):
     rig.timeline.append(Event(gone_us, "gone"))
     time.sleep(0.3)
     status = rig.client().request("status")
-    t.check(status["lease"]["holder"] is None, f"nobody holds the lease: {status['lease']}")
+    t.check(status["lease"]["holder"] is None, f"no client holds the lease: {status['lease']}")
     end_well(t, rig)
 
 
-@scenario("a relay that was stopped obeys nothing of what waited", 9)
+@scenario("a relay that was stopped obeys no command that waited", 9)
 def relay_stopped(t):
     rig, client = begin(t)
     for span in (0.6, 0.25, 1.5)[: rig.times(3)]:
         t.arm(client)
         t.drive_for(client, 200, 200, 0.4)
         rig.gateway.signal(signal.SIGSTOP)
-        for number in range(100_000, 100_000 + int(span * 40)):  # Its socket takes 70 without waiting.
+        for number in range(100_000, 100_000 + int(span * 40)):  # Its socket accepts 70 commands without waiting.
             client.send_raw(raw_drive(number, 200))
             time.sleep(0.025)
         resumed_us = now_us()
@@ -120,7 +120,7 @@ def relay_stopped(t):
         try:
             replies = read_replies(client, number - 99_999)
             late = [r for r in replies if r.get("id", 0) >= 100_000 and r["ok"]]
-            t.check(not late, f"after {span} s {len(late)} commands that had waited were obeyed: {late[:1]}")
+            t.check(not late, f"after {span} s {len(late)} waiting commands were obeyed: {late[:1]}")
             t.check(replies and all(r["error"] in ("stale_command", "not_armed") for r in replies), f"{replies[:2]}")
         except Closed:
             t.check(span > 0.3, f"closed after {span} s")
@@ -131,7 +131,7 @@ def relay_stopped(t):
     t.judge(rig)
 
 
-@scenario("a relay that is killed stops the wheels within the lease, and another one serves at once", 5)
+@scenario("a relay that is killed stops the wheels within the lease, and the next one serves immediately", 5)
 def relay_killed(t):
     rig, client = begin(t)
     t.drive_for(client, 250, 250, 0.6)
@@ -140,7 +140,7 @@ def relay_killed(t):
     killed_us = now_us()
     rig.timeline.append(Event(killed_us, "ramp", within_us=LEASE_US))
     rig.start_relay()
-    t.check(rig.await_relay("board on "), f"the next relay meets the board: {rig.gateway.text()}")
+    t.check(rig.await_relay("board on "), f"the next relay finds the board: {rig.gateway.text()}")
     fresh = rig.client()
     t.expect(fresh.drive(100, 100), "not_armed")
     rig.wait_status(fresh, lambda s: s["state"] == "listening", 6)
@@ -168,12 +168,12 @@ def cable_pulled(t):
         rig.cable.pull()
         while rig.cable.master is not None:
             time.sleep(0.001)
-        for _ in range(20):  # Which it may notice a moment later.
-            told = rig.client().read_reply(1.0)
-            if told and ("plug" in told["message"] or "gone" in told["message"]):
+        for _ in range(20):  # The relay may notice the missing plug a moment later.
+            reply = rig.client().read_reply(1.0)
+            if reply and ("plug" in reply["message"] or "gone" in reply["message"]):
                 break
             time.sleep(0.05)
-        t.check(told and told["error"] == "bus_down" and ("plug" in told["message"] or "gone" in told["message"]), f"without a cable: {told}")
+        t.check(reply and reply["error"] == "bus_down" and ("plug" in reply["message"] or "gone" in reply["message"]), f"without a cable: {reply}")
         time.sleep(0.3)
         rig.cable.plug()
         client = await_service(t, rig)
@@ -184,7 +184,7 @@ def cable_pulled(t):
 
 
 def await_service(t, rig, seconds=5.0):
-    """A client that the board has welcomed."""
+    """Waits for a client that the board has welcomed."""
     end = time.monotonic() + seconds
     while time.monotonic() < end:
         client = rig.client()
@@ -237,11 +237,11 @@ def send_bad_lines(t, count, block_lines):
     t.expect(client.request("stop"))
     t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 6), "listening")
     time.sleep(0.4)
-    drives = [line + b"\n" for line in bytes(rig.cable.heard).split(b"\n") if b'"drive"' in line]
+    drives = [line + b"\n" for line in bytes(rig.cable.from_relay).split(b"\n") if b'"drive"' in line]
     t.check(len(drives) > 10 and all(b'"boot"' in line and b'"t_us"' in line for line in drives), f"{drives[:1]}")
     chance, before_us = random.Random(7), now_us()
     t.arm(client)
-    rig.note_after(1_000_000, "ramp", within_us=LEASE_US)  # Its first lease passes without a command.
+    rig.note_after(1_000_000, "ramp", within_us=LEASE_US)  # The first lease ends without a command.
     sent = 0
     while sent < count:
         block = b"".join(mutated(chance.choice(drives), chance) for _ in range(block_lines))
@@ -249,10 +249,10 @@ def send_bad_lines(t, count, block_lines):
         sent += block_lines
         if sent % (4 * block_lines) == 0:
             client.request("hello")
-    t.check(client.request("hello")["ok"], "the line is in order after them")
+    t.check(client.request("hello")["ok"], "the line works after them")
     time.sleep(0.2)
-    t.rule(not rig.moving(before_us), f"{len(rig.moving(before_us))} setpoints that move, of lines that were bad or old")
-    errors = bytes(rig.cable.told).count(b'"line_error"')
+    t.rule(not rig.moving(before_us), f"{len(rig.moving(before_us))} moving setpoints from bad or late lines")
+    errors = bytes(rig.cable.from_board).count(b'"line_error"')
     t.check(0 < errors <= 5 * (now_us() - before_us) / 1e6 + 2, f"{errors} line_errors in {(now_us() - before_us) / 1e6:.1f} s")
     t.figure(f"{sent} lines in {(now_us() - before_us) / 1e6:.1f} s, {errors} answers")
     t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 6), "listening")
@@ -263,7 +263,7 @@ def send_bad_lines(t, count, block_lines):
 
 
 class Damage:
-    """One piece in thirty has a bit turned. `stops`: how many of those held a stop."""
+    """Changes a bit in one of thirty pieces. `stops`: number of changed pieces that contained a stop."""
 
     def __init__(self, chance):
         self.chance, self.stops = chance, 0
@@ -277,7 +277,7 @@ class Damage:
 
 
 class FirstAnswer:
-    """The first piece with an answer has one wrong byte."""
+    """Changes one byte in the first piece with a reply."""
 
     def __init__(self):
         self.done = False
@@ -290,7 +290,7 @@ class FirstAnswer:
         return data[:at] + b"!" + data[at + 1 :]
 
 
-@scenario("a wire that damages one line in thirty to the board: what is lost is not obeyed, and a stop always arrives", 12)
+@scenario("a wire that damages one line in thirty to the board: no damaged command is obeyed, and a stop always arrives", 12)
 def noisy(t):
     rig, client = begin(t)
     rig.cable.up = Damage(random.Random(3))
@@ -301,22 +301,22 @@ def noisy(t):
             time.sleep(0.02)
         damaged = rig.cable.up.stops
         stops += 1 if client.request("stop")["ok"] else 0
-        # The relay sends a stop again that was not answered. Until it arrives the lease holds, at most.
+        # The relay repeats a stop without a reply. Until the stop arrives, the lease may hold.
         late_us = min((rig.cable.up.stops - damaged) * STOP_AGAIN_US, LEASE_US)
         rig.timeline[-1] = rig.timeline[-1]._replace(within_us=late_us)
         rig.wait_status(client, lambda s: s.get("state") == "listening", 6)
         client.arm()
     rig.cable.up = None
     t.check(stops == 6, f"{stops} of 6 stops were answered")
-    t.figure(f"{bytes(rig.cable.told).count(b'line_error')} line_errors")
+    t.figure(f"{bytes(rig.cable.from_board).count(b'line_error')} line_errors")
     t.expect(client.request("stop"))
     end_well(t, rig, client)
 
 
-@scenario("a wire that damages one line in thirty from the board: a client is told what has no answer, and a stop is said again", 8)
+@scenario("a wire that damages one line in thirty from the board: a missing reply is reported to the client, and a stop is repeated", 8)
 def deaf(t):
     rig, client = begin(t)
-    client.timeout = 5.0  # After 3 s the relay says that there is no answer.
+    client.timeout = 5.0  # After 3 s the relay reports a missing reply.
     rig.cable.down = FirstAnswer()
     t.expect(client.request("status"), "internal")
     rig.cable.down = Damage(random.Random(4))
@@ -338,7 +338,7 @@ def delayed(t):
     rig, client = begin(t)
     t.drive_for(client, 200, 200, 0.4)
     rig.cable.held = True
-    time.sleep(0.03)  # What the cable had in its hand has gone.
+    time.sleep(0.03)  # The cable has delivered the bytes that it held.
     held_us = now_us()
     rig.timeline.append(Event(held_us, "ramp", within_us=LEASE_US))
     for number in range(60):
@@ -351,13 +351,13 @@ def delayed(t):
         replies = read_replies(client, 60, 2.0)
         t.check(not any(r["ok"] for r in replies), f"{[r for r in replies if r['ok']][:2]}")
     except Closed:
-        pass  # A port that takes nothing for a second is opened anew.
+        pass  # The relay reopens a port that accepts nothing for a second.
     time.sleep(0.4)
-    t.rule(not rig.moving(released_us), "nothing that waited in the wire moves a wheel")
+    t.rule(not rig.moving(released_us), "no command that waited in the wire moves a wheel")
     end_well(t, rig, await_service(t, rig))
 
 
-@scenario("commands faster than the line: each is answered, the newest goes, none waits", 5)
+@scenario("commands faster than the line: each gets a reply, the newest is sent, none waits", 5)
 def too_fast(t):
     rig, client = begin(t)
     first_us = now_us()
@@ -367,7 +367,7 @@ def too_fast(t):
             time.sleep(0.005)
     replies = read_replies(client, 400)
     note_drives(rig, first_us, [r for r in replies if r["ok"]])
-    t.check([r["id"] for r in replies] == list(range(400)), f"400 answers in order, {len(replies)} came")
+    t.check([r["id"] for r in replies] == list(range(400)), f"400 replies in order expected, {len(replies)} came")
     replaced = [r for r in replies if not r["ok"]]
     t.check(all(r["error"] == "stale_command" for r in replaced), f"{[r for r in replaced if r['error'] != 'stale_command'][:2]}")
     t.check(0 < len(replaced) < 400, f"{len(replaced)} of 400 were replaced")
@@ -401,24 +401,24 @@ def flood(t):
     t.drive_for(client, 200, 200, 1.5)
     begin_us = now_us()
     t.expect(rig.watcher().request("stop"))
-    t.figure(f"stop in {(now_us() - begin_us) / 1000:.0f} ms beside the flood")
+    t.figure(f"stop in {(now_us() - begin_us) / 1000:.0f} ms during the flood")
     quit_now.set()
     flooder.socket.shutdown(socket.SHUT_RDWR)
     end_well(t, rig, rig.client())
 
 
-@scenario("a client that reads nothing costs nobody anything, and learns what it lost", 6)
+@scenario("a client that reads nothing harms no other client, and learns about lost events", 6)
 def slow(t):
     rig, client = begin(t)
     idle = rig.client()
     idle.request("watch", topics=["state", "force"], rate_hz=100)
     t.drive_for(client, 200, 200, 2.0)
     t.expect(client.request("stop"))
-    t.check(idle.request("hello")["ok"], "it may go on when it reads again")
+    t.check(idle.request("hello")["ok"], "it may continue after it reads again")
     end_well(t, rig, client)
 
 
-@scenario("who only watches can look and stop, and nothing else; the ninth client is told so", 4)
+@scenario("a watcher may only watch and stop; the ninth client is refused", 4)
 def rights(t):
     rig, client = begin(t)
     watcher = rig.watcher()
@@ -440,12 +440,12 @@ def rights(t):
     t.check(client.request("status")["state"] == "latched", "latched")
     others = [rig.client() for _ in range(4)] + [rig.watcher() for _ in range(2)]
     for other in others:
-        t.check(other.wait_event("hello"), "there is room for eight")
+        t.check(other.wait_event("hello"), "eight clients are accepted")
     for ninth in (rig.client(), rig.watcher()):
-        told = ninth.read_reply(1.0)
-        t.check(told and told["error"] == "too_many_clients", f"the ninth: {told}")
+        reply = ninth.read_reply(1.0)
+        t.check(reply and reply["error"] == "too_many_clients", f"the ninth: {reply}")
     others[0].close()
-    t.check(await_service(t, rig), "who leaves makes room")
+    t.check(await_service(t, rig), "a client that leaves frees its place")
     t.judge(rig)
 
 
@@ -458,12 +458,12 @@ def alone(t):
     t.check(second.returncode == 69 and str(rig.gateway.child.pid) in second.stderr and "two relays" in second.stderr, f"{second}")
     other = subprocess.run(rig.relay_command("--port", "/dev/null"), capture_output=True, text=True, timeout=10, check=False)
     t.check(other.returncode == 69 and "another program answers" in other.stderr, f"{other}")
-    t.check(rig.client().request("hello")["ok"], "the first goes on")
+    t.check(rig.client().request("hello")["ok"], "the first relay continues")
     t.judge(rig, moves=False)
 
 
 def troubles():
-    """What devices that are no board send, and what the relay says of it."""
+    """(bytes of a device that is no board, words of the relay's reason)"""
     chance = random.Random(5)
     noise = bytes(chance.randrange(256) for _ in range(200))
     return (
@@ -476,13 +476,13 @@ def troubles():
 
 
 @contextlib.contextmanager
-def talking(sock, said):
-    """A device that sends this again and again, as long as it is connected."""
+def talking(sock, sent):
+    """A device that repeats these bytes while it is connected."""
     over = threading.Event()
 
     def talk():
-        while said and not over.wait(0.05):
-            sock.sendall(said)
+        while sent and not over.wait(0.05):
+            sock.sendall(sent)
 
     talker = threading.Thread(target=talk)
     talker.start()
@@ -493,37 +493,37 @@ def talking(sock, said):
         talker.join()
 
 
-def check_told(t, rig, said, words, seconds):
-    """The log and a client that comes get this reason within that time."""
-    t.check(rig.await_relay(words, seconds), f"{said[:20]}: {words!r} expected, it said: {rig.gateway.text()[-400:]}")
-    told = rig.client().read_reply(1.0)
-    t.check(told and told["error"] == "bus_down" and words in told["message"], f"a client is told so: {told}")
+def check_told(t, rig, sent, words, seconds):
+    """Checks that the log and a new client get this reason within that time."""
+    t.check(rig.await_relay(words, seconds), f"{sent[:20]}: {words!r} expected, its output: {rig.gateway.text()[-400:]}")
+    reply = rig.client().read_reply(1.0)
+    t.check(reply and reply["error"] == "bus_down" and words in reply["message"], f"a client gets this reason: {reply}")
 
 
-@scenario("what is wrong with a line is said: nothing, noise, another protocol, another rate", 14)
+@scenario("the relay reports the fault of a line: nothing, noise, another protocol, another rate", 14)
 def explained(t):
     rig = t.rig()
-    for said, words in troubles():
+    for sent, words in troubles():
         ours, theirs = socket.socketpair()
         rig.cable = Cable(rig.path("port"), ours)
-        with talking(theirs, said):
+        with talking(theirs, sent):
             relay = rig.start_relay()
-            check_told(t, rig, said, words, 8.0)
+            check_told(t, rig, sent, words, 8.0)
             relay.end()
         rig.cable.end()
         theirs.close()
     rig.cable = None
 
 
-@scenario("another reason is said soon after the device changes, by the same relay", 18)
+@scenario("the same relay reports another reason soon after the device changes", 18)
 def explained_anew(t):
     rig = t.rig()
     ours, theirs = socket.socketpair()
     rig.cable = Cable(rig.path("port"), ours)
     rig.start_relay()
-    for said, words in troubles():
-        with talking(theirs, said):
-            check_told(t, rig, said, words, 8.0)
+    for sent, words in troubles():
+        with talking(theirs, sent):
+            check_told(t, rig, sent, words, 8.0)
     theirs.close()
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The service as systemd sees it: units, users, files, sandbox, restarts, rights to its socket.
+"""Tests the service from systemd's point of view: units, users, files, sandbox, restarts, rights to its socket.
 
 Nothing here needs a running systemd.
 """
@@ -32,21 +32,21 @@ from verdict import hold
 import iwheel
 
 EXPOSURE_MAX = 13
-"""Tenths, as systemd-analyze --threshold counts."""
+"""Tenths, with the count of systemd-analyze --threshold."""
 GATEWAYS = {"iwheel-gateway.service": "iwheel-gateway.service", "iwheel-gateway@.service": "iwheel-gateway@can0.service"}
 RESTARTS = {"iwheel-can-restart@.service": "iwheel-can-restart@can0.service", "iwheel-can-restart@.path": "iwheel-can-restart@can0.path"}
 UNITS = {**RESTARTS, **GATEWAYS}
 ROS2 = "iwheel-ros2.service"
 ROS2_EXPOSURE_MAX = 14
-"""It has a network."""
+"""The bridge has a network."""
 SERIAL = "iwheel-serial.service"
 WEB = "iwheel-web.service"
 WEB_SOCKET = "iwheel-web.socket"
 MQTT = "iwheel-mqtt.service"
 WEB_EXPOSURE_MAX = 14
-"""It may listen on a network."""
+"""The bridge may listen on a network."""
 RESTART_EXPOSURE_MAX = 16
-"""It may do one thing: change interfaces."""
+"""The unit may do one thing: change interfaces."""
 SLOW = {"drive": {"lease_ms": 300}, "limits": {"echo_ms": 200, "wheel_silent_ms": 200}}
 build = os.environ.get("IWHEEL_BUILD", os.path.join(ROOT, "build", "default"))
 
@@ -67,7 +67,7 @@ def values(unit, key):
 
 
 def complaints_of_udev(rules):
-    """What udev says of a file of rules. Whether this machine has the groups in it does not matter."""
+    """udev's complaints about a file of rules. The result does not depend on the groups of this machine."""
     need("udevadm")
     with tempfile.TemporaryDirectory() as root:
         path = os.path.join(root, "usr/lib/udev/rules.d/60-iwheel.rules")
@@ -82,9 +82,9 @@ def complaints_of_udev(rules):
 
 
 def read_rules_in(root):
-    """udevadm test reads all rules before it looks for its device; here in a root in which ours are the only ones."""
+    """udevadm test reads all rules before it searches its device; here in a root that contains only our rules."""
     if os.geteuid() != 0:
-        raise unittest.SkipTest("this udevadm cannot verify rules (systemd 254 can), and only root can show it ours alone")
+        raise unittest.SkipTest("this udevadm cannot verify rules (systemd 254 can), and only root can show it only our rules")
     program = os.path.realpath(shutil.which("udevadm"))
     libraries = subprocess.run(["ldd", program], capture_output=True, text=True, check=True).stdout
     for path in (program, *re.findall(r"(/\S+) \(0x", libraries)):
@@ -110,7 +110,7 @@ class Units(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             for unit, name in {**UNITS, ROS2: ROS2, SERIAL: SERIAL}.items():
                 text = read("systemd", unit).replace("/usr/bin/iwheel-gateway", os.path.join(build, "app/gateway/iwheel-gateway"))
-                text = text.replace("/usr/bin/iwheel-ros2", "/bin/true")  # Not built everywhere.
+                text = text.replace("/usr/bin/iwheel-ros2", "/bin/true")  # Not every build has it.
                 text = text.replace("/usr/bin/iwheel-serial", os.path.join(build, "app/bridge/serial/iwheel-serial"))
                 text = re.sub("(?m)^Documentation=.*$", "", text)
                 with open(os.path.join(folder, name), "w", encoding="utf-8") as file:
@@ -119,7 +119,7 @@ class Units(unittest.TestCase):
                 ours = [line for line in done.stderr.splitlines() if "iwheel" in line]
                 self.assertEqual((ours, done.returncode), ([], 0), done.stderr)
 
-    def test_bridges_that_watch_are_shut_in_and_not_started_by_themselves(self):
+    def test_watching_bridges_are_confined_and_not_autostarted(self):
         need("systemd-analyze")
         for unit, ends in ((WEB, "64 77 78"), (MQTT, "64 73 77 78")):
             path = os.path.join(SHARE, "systemd", unit)
@@ -129,13 +129,13 @@ class Units(unittest.TestCase):
             self.assertEqual(values(unit, "SupplementaryGroups"), ["iwheel-watch"])
             self.assertEqual(values(unit, "RestartPreventExitStatus"), [ends])
             with tempfile.TemporaryDirectory() as folder:
-                text = re.sub("(?m)^Documentation=.*$", "", re.sub("/usr/bin/iwheel-[a-z]+", "/bin/true", read("systemd", unit)))  # Not built everywhere.
+                text = re.sub("(?m)^Documentation=.*$", "", re.sub("/usr/bin/iwheel-[a-z]+", "/bin/true", read("systemd", unit)))  # Not every build has them.
                 with open(os.path.join(folder, unit), "w", encoding="utf-8") as file:
                     file.write(text)
                 done = subprocess.run(["systemd-analyze", "verify", os.path.join(folder, unit)], capture_output=True, text=True, check=False)
                 self.assertEqual(([line for line in done.stderr.splitlines() if "iwheel" in line], done.returncode), ([], 0), done.stderr)
 
-    def test_the_bridge_to_ros_stays_on_this_machine_and_in_its_memory(self):
+    def test_ros_bridge_stays_on_this_machine_and_in_its_memory(self):
         self.assertEqual(values(ROS2, "IPAddressDeny"), ["any"])
         self.assertEqual(values(ROS2, "IPAddressAllow"), ["localhost"])
         self.assertEqual(values(ROS2, "MemoryMax"), ["64M"])
@@ -154,7 +154,7 @@ class Units(unittest.TestCase):
         self.assertEqual(values(WEB_SOCKET, "WantedBy"), ["sockets.target"])  # Before any user.
         self.assertEqual((values(WEB, "Wants"), values(WEB, "Also")), ([WEB_SOCKET], [WEB_SOCKET]))
         self.assertIn(WEB_SOCKET, values(WEB, "After")[0].split())
-        # With PartOf, BindsTo or a restart of its own the port would be free for a moment.
+        # With PartOf, BindsTo or its own restart the port would be free for a moment.
         self.assertNotRegex(read("systemd", WEB_SOCKET), "(?m)^(PartOf|BindsTo|Requires|RemoveOnStop)=")
         need("systemd-analyze")
         with tempfile.TemporaryDirectory() as folder:
@@ -166,7 +166,7 @@ class Units(unittest.TestCase):
             done = subprocess.run(command, capture_output=True, text=True, check=False)
             self.assertEqual(([line for line in done.stderr.splitlines() if "iwheel" in line], done.returncode), ([], 0), done.stderr)
 
-    def test_the_template_differs_only_in_what_names_the_bus(self):
+    def test_template_differs_only_in_the_name_of_the_bus(self):
         plain, template = (read("systemd", unit).splitlines() for unit in GATEWAYS)
         different = {line.split("=")[0] for line in set(plain) ^ set(template)}
         self.assertEqual(different, {"Description", "ExecStart", "After"})
@@ -207,10 +207,10 @@ class Units(unittest.TestCase):
             with self.subTest(wrong):
                 self.assertNotEqual(complaints_of_udev(wrong + "\n"), [])
 
-    def test_udev_gives_only_to_groups_that_we_make(self):
+    def test_udev_uses_only_groups_that_we_create(self):
         made = set(re.findall(r"^g (\w+)", read("sysusers.d", "iwheel.conf"), re.MULTILINE))
-        given = set(re.findall(r'\bGROUP="([^"]*)"', read("udev", "60-iwheel.rules")))
-        self.assertTrue(given and given <= made, f"{given} is not among {made}")
+        listed = set(re.findall(r'\bGROUP="([^"]*)"', read("udev", "60-iwheel.rules")))
+        self.assertTrue(listed and listed <= made, f"{listed} is not among {made}")
 
     def test_the_network_example_asks_for_the_wheels_timing(self):
         text = read("networkd", "80-iwheel-can.network")
@@ -218,7 +218,7 @@ class Units(unittest.TestCase):
         self.assertIn("\nSamplePoint=62.5%\n", text)
         self.assertIn("\nTransmitQueueLength=4\n", read("networkd", "70-iwheel-can.link"))
 
-    def test_sockets_may_have_the_room_that_the_gateway_asks_for(self):
+    def test_socket_buffers_may_be_as_large_as_requested(self):
         with open(os.path.join(ROOT, "port/linux/include/iwheel_linux/bus_link.h"), encoding="utf-8") as file:
             factors = re.search(r"IWL_LINK_ROOM_BYTES \((\d+)U \* (\d+)U \* (\d+)U\)", file.read()).groups()
         granted = re.search(r"^net\.core\.rmem_max = (\d+)$", read("sysctl.d", "10-iwheel.conf"), re.MULTILINE)
@@ -229,7 +229,7 @@ def internet_sockets(pid):
     """Sockets of this process in the kernel's tables of TCP, UDP and raw sockets, as (table, address)."""
     inodes, found = set(), []
     for fd in os.listdir(f"/proc/{pid}/fd"):
-        with contextlib.suppress(FileNotFoundError):  # The one that lists them.
+        with contextlib.suppress(FileNotFoundError):  # The descriptor of this listing.
             inodes.update(re.findall(r"^socket:\[(\d+)\]$", os.readlink(f"/proc/{pid}/fd/{fd}")))
     for table in ("tcp", "tcp6", "udp", "udp6", "raw", "raw6"):
         if os.path.exists(f"/proc/{pid}/net/{table}"):
@@ -247,7 +247,7 @@ class Running(unittest.TestCase):
 
     def test_the_gateway_has_no_internet_socket(self):
         with socket.create_server(("127.0.0.1", 0)):
-            self.assertEqual(len(internet_sockets(os.getpid())), 1, "what this test reads finds one")
+            self.assertEqual(len(internet_sockets(os.getpid())), 1, "the function finds its own socket")
         rig = self.rig()
         rig.start_gateway()
         self.assertEqual(internet_sockets(rig.gateway.child.pid), [])
@@ -263,22 +263,22 @@ class Running(unittest.TestCase):
             code = subprocess.run([gateway, *arguments], capture_output=True, check=False, timeout=5).returncode
             self.assertIn(code, never, arguments)
 
-    def test_ready_watchdog_and_stopping_are_told(self):
+    def test_ready_watchdog_and_stopping_are_reported(self):
         rig = self.rig()
-        heard = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
-        self.addCleanup(heard.close)
-        heard.bind(rig.path("notify"))
-        heard.settimeout(3)
+        notifications = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        self.addCleanup(notifications.close)
+        notifications.bind(rig.path("notify"))
+        notifications.settimeout(3)
         os.environ.update(NOTIFY_SOCKET=rig.path("notify"), WATCHDOG_USEC="200000")
         try:
             rig.start_gateway()
         finally:
             del os.environ["NOTIFY_SOCKET"], os.environ["WATCHDOG_USEC"]
-        words = [heard.recv(100) for _ in range(4)]
+        words = [notifications.recv(100) for _ in range(4)]
         self.assertEqual(words, [b"READY=1"] + 3 * [b"WATCHDOG=1"])
         rig.gateway.signal(signal.SIGTERM)
         while words[-1] != b"STOPPING=1":
-            words.append(heard.recv(100))
+            words.append(notifications.recv(100))
         self.assertEqual(rig.gateway.wait(5), 0)
 
     def test_the_sandbox_allows_every_system_call_it_makes(self):
@@ -291,7 +291,7 @@ class Running(unittest.TestCase):
         with iwheel.Gateway(rig.path("gateway.sock"), timeout=3) as gateway:
             gateway.watch("state", "frame")
             gateway.status()
-            with contextlib.suppress(iwheel.IWheelError):  # Traced it is slow, and may find itself late.
+            with contextlib.suppress(iwheel.IWheelError):  # The traced gateway is slow, and may detect that it is late.
                 gateway.arm()
             gateway.estop()
         tracer = rig.gateway.child.pid
@@ -301,7 +301,7 @@ class Running(unittest.TestCase):
         with open(trace, encoding="utf-8", errors="replace") as file:
             made = {match[1] for match in re.finditer(r"(?m)^\d+ +(?:<\.\.\. )?([a-z_0-9]+)[( ]", file.read())}
         self.assertTrue({"epoll_wait", "epoll_pwait2"} & made, made)
-        made -= {"execve", "exit_group"}  # Made before the filter is there, and always allowed.
+        made -= {"execve", "exit_group"}  # Called before the filter is installed, and always allowed.
         self.assertEqual(made - self.allowed(), set())
 
     def allowed(self):
@@ -317,7 +317,7 @@ class Running(unittest.TestCase):
         self.assertGreater(len(allowed), 100)
         return allowed
 
-    def test_an_upgrade_while_somebody_drives_never_moves_a_wheel(self):
+    def test_upgrade_while_a_client_drives_never_moves_a_wheel(self):
         rig = self.rig()
         rig.start_gateway()
         with iwheel.Gateway(rig.path("gateway.sock"), wait=10) as gateway:
@@ -338,16 +338,16 @@ class Running(unittest.TestCase):
         nonzero = [t for t, _, speed in rig.bus.setpoints() if speed != 0]
         self.assertTrue(nonzero and nonzero[-1] < stopped_us + 600_000, "it went on driving, or never drove")
         zeros = [t for t, _, speed in rig.bus.setpoints(nonzero[-1]) if speed == 0]
-        self.assertGreater(zeros[-1] - nonzero[-1], 1_000_000, "the wheels were left to their own watchdog")
+        self.assertGreater(zeros[-1] - nonzero[-1], 1_000_000, "no zeros stopped the wheels, only their own watchdog")
         hold(not rig.bus.setpoints(ended_us), "the new version sent something unasked")
 
 
 class Rights(unittest.TestCase):
-    """Who is not in the socket's group can neither watch nor drive nor stop; who is, can do all three."""
+    """Users outside the socket's group can neither watch nor drive nor stop; members can do all three."""
 
     def setUp(self):
         if os.geteuid() != 0:
-            self.skipTest("needs root to become other users")
+            self.skipTest("needs root to change the user")
         self.rig = Rig(build, {**SLOW, "northbound": {"mode": "0660", "group": "daemon"}})
         self.addCleanup(self.rig.close)
         os.chmod(self.rig.folder, 0o755)
@@ -355,7 +355,7 @@ class Rights(unittest.TestCase):
         self.socket = self.rig.path("gateway.sock")
 
     def as_user(self, groups, action):
-        """What the action says in a process of that user: "ok" or the error's class."""
+        """The result of the action in a process of that user: "ok" or the error's class."""
         reading, writing = os.pipe()
         child = os.fork()
         if child == 0:
@@ -417,16 +417,16 @@ while True:
             one.send(lines)
         except BlockingIOError:
             pass
-        except OSError:  # Too slow to take all its replies, it was thrown out.
+        except OSError:  # The gateway closes a client that reads its replies too slowly.
             watchers[i] = watcher()
 """
 
 
 class Watchers(Rights):
-    """Who is in the group of the second socket only: may look and stop, never drive, and takes nothing from who drives."""
+    """Members of the second socket's group may watch and stop. They can never drive, and they use no place of the drivers' socket."""
 
     GROUP = 4
-    """Of some name on every Debian (adm); group `daemon` (1) may drive."""
+    """A group with some name on every Debian (adm); group `daemon` (1) may drive."""
 
     def setUp(self):
         super().setUp()
@@ -442,15 +442,15 @@ class Watchers(Rights):
             self.assertEqual(self.as_user([self.GROUP], action), answer)
         self.socket = self.driving
         for action, answer in ((self.watch, "GatewayUnavailable"), (self.drive, "GatewayUnavailable"), (self.stop, "ok")):
-            self.assertEqual(self.as_user([self.GROUP], action), answer)  # A stop takes the other socket.
+            self.assertEqual(self.as_user([self.GROUP], action), answer)  # For the stop, the client uses the watch socket.
 
-    def test_who_keeps_stopping_is_named_to_who_resets(self):
+    def test_reset_refused_by_repeated_stops_names_the_stopping_user(self):
         self.assertEqual(self.as_user([self.GROUP], self.stop), "ok")
         with self.assertRaises(iwheel.Refused) as refusal:
             iwheel.Gateway(self.driving).reset()
         self.assertRegex(str(refusal.exception), f"user {STRANGER} .process [0-9]+")
 
-    def test_iwheelctl_says_by_which_socket_it_watches(self):
+    def test_iwheelctl_reports_by_which_socket_it_watches(self):
         done = subprocess.run(
             [self.rig.program("iwheelctl"), "--socket", self.socket, "drive", "50", "50", "--for", "100ms"], capture_output=True, text=True, check=False
         )
@@ -458,7 +458,7 @@ class Watchers(Rights):
         self.assertIn(f"clients that drive use {self.driving} and are in group daemon", done.stderr)
         self.assertNotEqual(done.returncode, 0)
 
-    def test_a_crowd_that_asks_without_end_costs_who_drives_no_gap_and_no_slot(self):
+    def test_request_flood_costs_the_driver_no_gap_and_no_slot(self):
         flood = subprocess.Popen([sys.executable, "-c", FLOOD, self.socket, "64"], stdout=subprocess.PIPE, text=True)
         self.addCleanup(flood.stdout.close)
         self.addCleanup(flood.wait)
@@ -471,19 +471,19 @@ class Watchers(Rights):
                 while now_us() < begin_us + 2_000_000:
                     wheels.drive(100, 100)
                     time.sleep(0.03)
-        self.assertIsNone(flood.poll(), "the crowd was to go on")
+        self.assertIsNone(flood.poll(), "the crowd must continue")
         moments = [t for t, side, _ in self.rig.bus.setpoints(begin_us) if t < begin_us + 2_000_000]
         gaps = [later - sooner for sooner, later in itertools.pairwise(moments)]
-        self.assertLess(max(gaps), 100_000, "half of what the wheels' watchdog and the lease leave")
+        self.assertLess(max(gaps), 100_000, "half of the time that the wheels' watchdog and the lease allow")
         self.assertGreater(len(moments), 150)
 
 
 class Strangers(unittest.TestCase):
-    """Another local user, who may do nothing: neither keep the gateway from starting, nor get anything in its place."""
+    """Another local user without any right: it can neither prevent the start of the gateway nor gain anything in its place."""
 
     def setUp(self):
         if os.geteuid() != 0:
-            self.skipTest("needs root to become other users")
+            self.skipTest("needs root to change the user")
         self.rig = Rig(build, SLOW)
         self.addCleanup(self.rig.close)
         os.chmod(self.rig.folder, 0o755)
@@ -491,17 +491,17 @@ class Strangers(unittest.TestCase):
     def wait_for(self, condition):
         deadline = time.monotonic() + 5
         while not condition():
-            self.assertLess(time.monotonic(), deadline, "it does not come")
+            self.assertLess(time.monotonic(), deadline, "the condition does not become true")
             time.sleep(0.02)
 
     def second(self):
-        """Exit code and words of another gateway on the same bus, its socket elsewhere."""
+        """Exit code and output of another gateway on the same bus, with its socket elsewhere."""
         os.makedirs(self.rig.path("elsewhere"), exist_ok=True)
         other = Process(self.rig.gateway_command("--socket", self.rig.path("elsewhere/gateway.sock")), self.rig.path("second.out"))
         self.rig.processes.append(other)
         return other.wait(5), other.text()
 
-    def test_who_holds_the_lock_s_names_keeps_nobody_from_starting_even_after_a_kill_in_motion(self):
+    def test_lock_names_held_by_stranger_prevent_no_restart(self):
         names = lock_names(self.rig.gateway_bus())
         self.rig.start_gateway()
         with iwheel.Gateway(self.rig.path("gateway.sock"), wait=10) as gateway:
@@ -518,7 +518,7 @@ class Strangers(unittest.TestCase):
         code, text = self.second()
         self.assertEqual(code, 69, text)
 
-    def test_a_folder_that_is_not_safe_is_refused_with_the_cure(self):
+    def test_unsafe_folder_is_refused_with_the_fix(self):
         for mode, owner, word in ((0o777, 0, "chmod go-w"), (0o775, 0, "chmod go-w"), (0o755, STRANGER, "make the gateway's user its owner")):
             folder = self.rig.path(f"folder-{mode:o}-{owner}")
             os.mkdir(folder)
@@ -529,7 +529,7 @@ class Strangers(unittest.TestCase):
             self.assertEqual(done.returncode, 77, done.stderr)
             self.assertIn(word, done.stderr)
 
-    def test_a_socket_in_a_folder_like_tmp_cannot_be_held_against_root(self):
+    def test_socket_in_folder_like_tmp_cannot_block_root(self):
         shared = self.rig.path("shared")
         os.mkdir(shared)
         os.chmod(shared, 0o1777)
@@ -546,7 +546,7 @@ class Strangers(unittest.TestCase):
         with iwheel.Gateway(path, wait=5) as gateway:
             self.assertEqual(gateway.status()["state"], "listening")
 
-    def test_a_record_directory_that_is_not_safe_is_told_and_nothing_is_put_there(self):
+    def test_record_directory_unsafe_is_reported_and_stays_empty(self):
         for mode, owner, word in ((0o1777, 0, "chmod go-w"), (0o755, STRANGER, "make the gateway's user its owner")):
             folder = self.rig.path(f"records-{mode:o}")
             os.mkdir(folder)

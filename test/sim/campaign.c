@@ -5,16 +5,16 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define REPLAY_EACH 25U ///< Every so manieth seed is played twice.
+#define REPLAY_EACH 25U ///< One seed of this many is played twice.
 #define TOLERATED   3U  ///< Seeds that may fail before a campaign ends.
 
-/// Whether the rule stays broken without these events; else they are put back.
-static bool can_do_without(const campaign_t *self, size_t from, size_t taken, uint32_t rule) {
+/// Removes these events. Returns true if the rule stays broken without them, otherwise restores them.
+static bool can_do_without(const campaign_t *self, size_t from, size_t removed, uint32_t rule) {
     static event_t before[CAMPAIGN_EVENTS_MAX];
     const size_t count = *self->count;
     memcpy(before, self->event, count * sizeof before[0]);
-    memmove(&self->event[from], &self->event[from + taken], (count - from - taken) * sizeof before[0]);
-    *self->count = count - taken;
+    memmove(&self->event[from], &self->event[from + removed], (count - from - removed) * sizeof before[0]);
+    *self->count = count - removed;
     if (self->play(IW_NEVER).rule == rule) {
         return true;
     }
@@ -23,16 +23,16 @@ static bool can_do_without(const campaign_t *self, size_t from, size_t taken, ui
     return false;
 }
 
-/// Leaves out events, in ever smaller pieces, as long as the same rule stays broken.
+/// Removes events in ever smaller pieces as long as the same rule stays broken.
 static void shrink(const campaign_t *self, uint32_t rule) {
     size_t piece = *self->count;
     while (piece > 0U) {
         bool shorter = false;
         for (size_t from = 0; from < *self->count;) {
-            const size_t taken = (from + piece <= *self->count) ? piece : *self->count - from;
-            const bool spare = can_do_without(self, from, taken, rule);
+            const size_t removed = (from + piece <= *self->count) ? piece : *self->count - from;
+            const bool spare = can_do_without(self, from, removed, rule);
             shorter = shorter || spare;
-            from += spare ? 0U : taken;
+            from += spare ? 0U : removed;
         }
         piece = (shorter && piece == 1U) ? 1U : piece / 2U;
     }
@@ -51,16 +51,16 @@ void campaign_tell_failure(const campaign_t *self, uint64_t seed, const verdict_
     printf("made small: %zu of %zu events; rule %u at %.6f s: %s\n", *self->count, drawn, (unsigned)small.rule,
            (double)small.broken_us / 1e6, small.text);
     self->print();
-    printf("what happened right before:\n");
+    printf("the events and setpoints before the end:\n");
     (void)self->play((small.broken_us > self->trace_us) ? small.broken_us - self->trace_us : 0U);
     (void)fflush(stdout);
 }
 
-/// The same seed must do the same again.
+/// Returns true if the same seed gives the same result again.
 static bool replays(const campaign_t *self, uint64_t seed, uint64_t hash) {
     const bool same = self->play(IW_NEVER).hash == hash;
     if (!same) {
-        printf("FAILED seed %llu: played again it does something else\n", (unsigned long long)seed);
+        printf("FAILED seed %llu: a second run differs\n", (unsigned long long)seed);
     }
     return same;
 }

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-/// Scenarios drawn from seeds, played one after another: one that breaks a rule is made small and told as a timeline.
+/// Scenarios drawn from seeds, played one after another. A scenario that breaks a rule is made small and printed as a timeline.
 #ifndef SIM_TEST_CAMPAIGN_H
 #define SIM_TEST_CAMPAIGN_H
 
 #include "iwheel/types.h"
 
-/// Something that happens, as drawn from a seed; what kinds there are, and what `a` and `b` mean, is each simulation's own.
+/// An event drawn from a seed. Each simulation defines its own kinds and the meaning of `a` and `b`.
 typedef struct {
     iw_time_us_t at_us;
     uint32_t span_us;
@@ -18,12 +18,12 @@ typedef struct {
 
 #define CAMPAIGN_EVENTS_MAX 512U
 
-/// What came of a play.
+/// The result of one run.
 typedef struct {
-    uint32_t rule; ///< That was broken; 0: all were kept.
+    uint32_t rule; ///< The broken rule; 0: none.
     iw_time_us_t broken_us;
     const char *text;
-    uint64_t hash; ///< Of all that was sent.
+    uint64_t hash; ///< Hash of all that was sent.
 } verdict_t;
 
 /// A simulation: it has one scenario at a time.
@@ -31,22 +31,22 @@ typedef struct {
     size_t *count; ///< Events of the scenario, at most CAMPAIGN_EVENTS_MAX.
     event_t *event;
     void (*draw)(uint64_t seed);
-    verdict_t (*play)(iw_time_us_t trace_from_us); ///< From then on it is told on stdout; IW_NEVER: not at all.
-    void (*print)(void);                           ///< The scenario, a line for each event.
-    void (*add)(void);                             ///< What came of the last play to the sum of all.
-    bool (*enough)(void);                          ///< So much has been played.
+    verdict_t (*play)(iw_time_us_t trace_from_us); ///< Prints a timeline from that time on; IW_NEVER: none.
+    void (*print)(void);                           ///< Prints the scenario, a line for each event.
+    void (*add)(void);                             ///< Adds the result of the last run to the sum of all.
+    bool (*enough)(void);                          ///< True if enough has been played.
     void (*tell_sum)(void);
-    iw_time_us_t trace_us; ///< Told of a scenario that was made small: so long before its end.
+    iw_time_us_t trace_us; ///< Length of the timeline of a small scenario, before its end.
 } campaign_t;
 
-/// Tells the rule that the scenario breaks, makes it small, prints what is left of it, and what happens right before.
+/// Prints the rule that the scenario breaks, makes the scenario small, and prints it with the timeline before its end.
 void campaign_tell_failure(const campaign_t *self, uint64_t seed, const verdict_t *failed);
 
-/// One line.
+/// Prints the broken rule in one line.
 void campaign_tell_broken(uint64_t seed, const verdict_t *failed);
 
-/// Plays seeds from `first` on until it is enough or three have failed; each 25th is played twice and must do the same again. `quick`:
-/// ends with the first that fails, which is not made small. Returns an exit status; the last line is "N passed, N failed, 0 skipped".
+/// Plays seeds from `first` on until it is enough or three have failed; each 25th is played twice and must give the same result. `quick`:
+/// ends at the first seed that fails and does not make it small. Returns an exit status; the last line is "N passed, N failed, 0 skipped".
 int campaign_run(const campaign_t *self, uint64_t first, bool quick);
 
 #endif

@@ -5,9 +5,9 @@
 #include <string.h>
 
 #define MS 1000U
-/// Rules of this file: what a refused request may change.
+/// A rule of this file: a refused request changes nothing that it must not change.
 #define RULE_REFUSED 901U
-/// What motion depends on is in doubt.
+/// A rule of this file: no arm while an assumption that motion depends on is contradicted.
 #define RULE_CONTRADICTED 324U
 #define POISON            0x5A
 
@@ -15,7 +15,7 @@ static bool can_run(const rig_t *rig) {
     return rig->alive && !rig_active(rig, EV_LOOP_STALL);
 }
 
-/// A refused request changes nothing but what is remembered of it.
+/// A refused request may change only the record of refusals.
 static void judge_refused(rig_t *rig, const iw_gateway_t *before) {
     iw_gateway_t after = rig->gateway;
     after.permit.stale_us = before->permit.stale_us;
@@ -26,7 +26,7 @@ static void judge_refused(rig_t *rig, const iw_gateway_t *before) {
     }
 }
 
-static void tell(rig_t *rig, const request_t *request, iw_refusal_t result) {
+static void note_result(rig_t *rig, const request_t *request, iw_refusal_t result) {
     rig->result->stats.requests++;
     rig->result->stats.refused[result]++;
     rig_hash(rig, ((uint64_t)request->kind << 32) ^ ((uint64_t)request->id << 8) ^ (uint64_t)result);
@@ -43,7 +43,7 @@ static int32_t current_for(const rig_t *rig, int32_t speed) {
 
 static iw_drive_t drive_of(const rig_t *rig, const request_t *request) {
     iw_drive_t drive = {{request->a, request->b}, {0, 0}, false};
-    // Every third command of 400 ms has limits of its own, every second of those unequal ones: from none to all there is.
+    // Every third command of 400 ms has its own limits, every second of those unequal ones: from zero to the maximum.
     const uint32_t turn = (uint32_t)(rig->now_us / (400U * MS)) + request->id;
     if (rig->scenario->config.current_role == IW_ROLE_LIMIT) {
         drive.has_current = turn % 3U == 0U;
@@ -65,7 +65,7 @@ static void request_drive(rig_t *rig, const request_t *request, const iw_gateway
     memset(&applied, POISON, sizeof applied);
     untouched = applied;
     const iw_refusal_t result = iw_gateway_drive(&rig->gateway, rig->now_us, request->id, &drive, &applied);
-    tell(rig, request, result);
+    note_result(rig, request, result);
     if (result != IW_REFUSE_NONE) {
         judge_refused(rig, before);
         if (memcmp(&applied, &untouched, sizeof applied) != 0) {
@@ -78,7 +78,7 @@ static void request_drive(rig_t *rig, const request_t *request, const iw_gateway
     oracle_drive(&rig->oracle, &asked, &drive, result, &applied);
 }
 
-/// Of what motion depends on: type, role and the signs.
+/// True if an assumption that motion depends on is contradicted: type, role or a sign.
 static bool is_contradicted(const iw_gateway_t *gateway) {
     static const iw_assumption_item_t guards[] = {IW_ASSUMPTION_SETPOINT_TYPE,      IW_ASSUMPTION_CURRENT_ROLE,
                                                   IW_ASSUMPTION_FEEDBACK_SIGN_LEFT, IW_ASSUMPTION_FEEDBACK_SIGN_RIGHT,
@@ -91,7 +91,7 @@ static bool is_contradicted(const iw_gateway_t *gateway) {
     return false;
 }
 
-/// The operator has looked at the machine and says that it is as configured.
+/// The operator checks the machine and confirms the configuration.
 static void settle_assumption(rig_t *rig) {
     const iw_assumption_entry_t word = {IW_CONFIRMED, IW_SOURCE_OPERATOR, 0};
     iw_gateway_set_assumption(&rig->gateway, rig->gateway.assumptions.doubt, &word);
@@ -99,7 +99,7 @@ static void settle_assumption(rig_t *rig) {
 
 static void request_arm(rig_t *rig, const request_t *request, const iw_gateway_t *before) {
     const iw_refusal_t result = iw_gateway_arm(&rig->gateway, rig->now_us, request->id, request->a != 0);
-    tell(rig, request, result);
+    note_result(rig, request, result);
     if (result != IW_REFUSE_NONE) {
         judge_refused(rig, before);
     } else if (is_contradicted(before)) {
@@ -113,7 +113,7 @@ static void request_arm(rig_t *rig, const request_t *request, const iw_gateway_t
 
 static void request_reset(rig_t *rig, const request_t *request, const iw_gateway_t *before) {
     const iw_refusal_t result = iw_gateway_reset(&rig->gateway, rig->now_us);
-    tell(rig, request, result);
+    note_result(rig, request, result);
     if (result != IW_REFUSE_NONE) {
         judge_refused(rig, before);
     }
@@ -122,7 +122,7 @@ static void request_reset(rig_t *rig, const request_t *request, const iw_gateway
 
 static void request_release(rig_t *rig, const request_t *request, const iw_gateway_t *before) {
     const iw_refusal_t result = iw_gateway_release(&rig->gateway);
-    tell(rig, request, result);
+    note_result(rig, request, result);
     if (result != IW_REFUSE_NONE) {
         judge_refused(rig, before);
     }
@@ -146,7 +146,7 @@ static void run_request(rig_t *rig, const request_t *request) {
         request_release(rig, request, &before);
         break;
     case EV_ONE_STOP:
-        tell(rig, request, IW_REFUSE_NONE);
+        note_result(rig, request, IW_REFUSE_NONE);
         if (request->b != 0) {
             oracle_shutdown(&rig->oracle, rig->now_us);
         }
@@ -155,12 +155,12 @@ static void run_request(rig_t *rig, const request_t *request) {
         oracle_stop(&rig->oracle, rig->now_us, true);
         break;
     case EV_ONE_ESTOP:
-        tell(rig, request, IW_REFUSE_NONE);
+        note_result(rig, request, IW_REFUSE_NONE);
         iw_gateway_estop(&rig->gateway, rig->now_us, request->id);
         oracle_soft_estop(&rig->oracle, rig->now_us);
         break;
     case EV_DISCONNECT:
-        tell(rig, request, IW_REFUSE_NONE);
+        note_result(rig, request, IW_REFUSE_NONE);
         iw_gateway_disconnect(&rig->gateway, rig->now_us, request->id);
         oracle_stop(&rig->oracle, rig->now_us,
                     request->id == rig->oracle.holder || request->id == rig->oracle.pending_arm);
@@ -172,7 +172,7 @@ static void run_request(rig_t *rig, const request_t *request) {
     rig_wake(rig, rig->now_us);
 }
 
-/// At once, or when the process runs again.
+/// Makes the request immediately, or when the process runs again.
 void client_request(rig_t *rig, const request_t *request) {
     if (can_run(rig)) {
         run_request(rig, request);
@@ -238,7 +238,7 @@ void clients_start(rig_t *rig, const event_t *event) {
     }
 }
 
-/// Speeds that change now and then: turned round, halved, stopped, held.
+/// The current command: it changes at times by reversing, halving, stopping or holding.
 static void config(const rig_t *rig, const client_t *client, int32_t *out_a, int32_t *out_b) {
     static const int8_t quarters[8] = {4, 4, -4, 2, 0, 4, -2, 4};
     const uint64_t turn = rig->now_us / (700U * MS);
@@ -247,7 +247,7 @@ static void config(const rig_t *rig, const client_t *client, int32_t *out_a, int
     *out_b = (client->style & 8U) ? client->a * share / 4 : client->b * share / 4;
 }
 
-/// Knows what its replies and events tell: state and holder.
+/// A client that knows the state and the holder from its replies and events.
 static void drive_well(rig_t *rig, const client_t *client) {
     const iw_state_t state = iw_gateway_state(&rig->gateway);
     int32_t a;

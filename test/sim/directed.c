@@ -8,15 +8,15 @@
 
 #define MS 1000U
 #define S  1000000U
-/// A frame of 8 bytes takes 120 us: this leaves no gap.
+/// Interval of frames that leaves no gap: a frame of 8 bytes lasts 120 us.
 #define BABBLE_US 100
 
 typedef struct {
     int32_t id;
-    iw_cause_t stop; ///< The only one it may cause.
+    iw_cause_t stop; ///< The only cause that may stop the wheels.
 } babble_t;
 
-/// Setpoints are 266 and 298. A wheel whose force frame (512, 544) never leaves sends nothing behind it either.
+/// Setpoints are 266 and 298. A wheel whose force frame (512, 544) never gets onto the bus sends no later frame either.
 static const babble_t babbles[] = {
     {0, IW_CAUSE_SEND_STALLED},   {100, IW_CAUSE_SEND_STALLED}, {255, IW_CAUSE_SEND_STALLED},
     {265, IW_CAUSE_SEND_STALLED}, {267, IW_CAUSE_SEND_STALLED}, {297, IW_CAUSE_SEND_STALLED},
@@ -24,7 +24,7 @@ static const babble_t babbles[] = {
     {600, IW_CAUSE_NONE},         {2047, IW_CAUSE_NONE},
 };
 
-/// A client drives for six seconds; in the middle of it the node babbles for two.
+/// A client drives for six seconds; meanwhile the node babbles for two.
 static void write_scenario(scenario_t *scenario, const babble_t *babble) {
     memset(scenario, 0, sizeof *scenario);
     scenario->seed = 1;
@@ -38,7 +38,7 @@ static void write_scenario(scenario_t *scenario, const babble_t *babble) {
     scenario->config.setpoint_type_set = true;
     scenario->config.current_role = IW_ROLE_LIMIT;
     scenario->config.track_mm = 540;
-    scenario->config.wheel_silent_ms = 200; // What is not echoed is found before what is not heard.
+    scenario->config.wheel_silent_ms = 200; // A missing echo is detected before missing telemetry.
     scenario->event[0] =
         (event_t){.at_us = 500U * MS, .span_us = 6U * S, .a = 400, .b = 300, .kind = EV_GOOD_CLIENT, .style = 3U};
     scenario->event[1] =

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The swarm on an emulated Cortex-M, which has no command line: what `test_sim --hashes` tells, for the seeds compiled in.
+// The swarm on an emulated Cortex-M, which has no command line: prints what `test_sim --hashes` prints, for the seeds compiled in.
 #include "rig.h"
 
 int main(void) {

@@ -10,23 +10,25 @@
 #define EXIT_USAGE  64
 
 static void usage(FILE *out) {
-    fputs("usage: test_sim [--seed N [--trace] [--events]] | [--first N] [--count N | --hours H | --hashes] | "
-          "--directed\n"
-          "Plays seeds through the real core in virtual time and judges each by the rules of motion permission.\n"
-          "A seed that fails is made small and told as a timeline. --seed N plays one, and tells the hash of all that "
-          "was sent.\n"
-          "--hashes plays --count seeds and tells only their hashes, for comparison between machines. --directed plays "
-          "a\n"
-          "node that babbles with lower and with higher ids. --quick ends at the first seed that fails, which is not "
-          "made small.\n"
-          "The line `summary ...` adds up what happened; the last line is `N passed, N failed, N skipped`.\n",
-          out);
+    fputs(
+        "usage: test_sim [--seed N [--trace] [--events]] | [--first N] [--count N | --hours H | --hashes] | "
+        "--directed\n"
+        "Plays seeds through the real core in virtual time and judges each by the rules of motion permission.\n"
+        "A seed that fails is made small and printed as a timeline. --seed N plays one seed and prints the hash of all "
+        "that "
+        "was sent.\n"
+        "--hashes plays --count seeds and prints only their hashes, for comparison between machines. --directed plays "
+        "a\n"
+        "node that babbles with lower and with higher ids. --quick ends at the first seed that fails, which is not "
+        "made small.\n"
+        "The line `summary ...` sums up the run; the last line is `N passed, N failed, N skipped`.\n",
+        out);
 }
 
 static scenario_t scenario;
 static rig_result_t result;
 static rig_stats_t sum;
-static double wanted_hours; ///< 0: as many as there are seeds.
+static double wanted_hours; ///< 0: no limit but the number of seeds.
 static uint64_t seeds_left;
 
 static void draw(uint64_t seed) {
@@ -108,7 +110,7 @@ typedef struct {
     bool quick;
 } options_t;
 
-/// True if the word is a switch without a value.
+/// Returns true if the word is a switch without a value.
 static bool take_switch(options_t *options, const char *word) {
     const struct {
         const char *name;

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Plays seeds on emulated Cortex-M and demands the hashes of this machine: the same bytes sent, the same answers."""
+"""Plays seeds on emulated Cortex-M and requires the hashes of this machine: the same bytes sent, the same replies."""
 
 import shutil
 import subprocess
@@ -7,7 +7,7 @@ import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-# The code of each CPU, optimised differently, and the machine that runs it (one of Cortex-M3 runs that of Cortex-M0+ too).
+# The code for each CPU, optimised differently, and the machine that runs it (a machine with Cortex-M3 runs the code for Cortex-M0+ too).
 BUILDS = {"cortex-m0plus -Os": "mps2-an385", "cortex-m3 -O0": "mps2-an385", "cortex-m4 -O2": "mps2-an386"}
 TIMEOUT_S = 600
 
@@ -71,7 +71,7 @@ def emulate(machine, program):
 
 
 def compare(program, first, count):
-    """Tells how many seeds agree; returns the exit status."""
+    """Prints how many seeds agree; returns the exit status."""
     missing = [tool for tool in ("arm-none-eabi-gcc", "qemu-system-arm") if shutil.which(tool) is None]
     if missing:
         print(f"skip: {', '.join(missing)} missing (scripts/install_tools check brings it)\n0 passed, 0 failed, 1 skipped")

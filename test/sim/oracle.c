@@ -10,7 +10,7 @@
 #define STOP_US (100U * MS)
 #define HUNG_US (500U * MS)
 #define DRAIN   512U
-/// A pause of offset frames that tells of a reboot, and one that may.
+/// A pause of offset frames that shows a reboot, and one that may show one.
 #define BACK_US       (6000U * MS)
 #define BACK_MAYBE_US (4900U * MS)
 
@@ -45,7 +45,7 @@ void oracle_start(oracle_t *self, const iw_gateway_t *gateway, iw_time_us_t now_
     self->gateway = gateway;
     self->config = &gateway->config;
     self->restarting = restarted;
-    self->kept = restarted && gateway->config.hold;
+    self->hold_active = restarted && gateway->config.hold;
     self->hard = true;
     self->state = iw_gateway_state(gateway);
     self->stopped_us = now_us;
@@ -70,7 +70,7 @@ iw_time_us_t oracle_hold_max_us(const oracle_t *self, iw_time_us_t from_us) {
     return contested ? CONTESTED_US : (iw_time_us_t)self->config->hold_max_s * 1000U * MS;
 }
 
-/// The end of zeros counts from here, or from when a hold without end last saw a wheel turn.
+/// The zeros are timed from here, or from the last time when a hold without end observed a wheel that turns.
 iw_time_us_t oracle_zeros_from(const oracle_t *self, iw_time_us_t from_us) {
     return (self->unsettled_us > from_us) ? self->unsettled_us : from_us;
 }
@@ -100,15 +100,15 @@ void oracle_soft_stop(oracle_t *self, iw_time_us_t at_us) {
     lose_permission(self);
 }
 
-// ---- what the gateway saw --------------------------------------------------------------------------------------
+// ---- input of the gateway --------------------------------------------------------------------------------------
 
 void oracle_step_begin(oracle_t *self, iw_time_us_t now_us, iw_time_us_t promised_us) {
     const iw_time_us_t late_us = (now_us > promised_us) ? now_us - promised_us : 0U;
     const bool late = late_us > LATE_US;
-    self->stalled = late || (self->stalled && self->taken >= DRAIN);
+    self->stalled = late || (self->stalled && self->received >= DRAIN);
     self->late_stop = late_us >= STOP_US;
     self->hung = late_us > HUNG_US;
-    self->taken = 0;
+    self->received = 0;
     self->foreign_now = self->jump_now = self->back_now = self->may_be_back = false;
     self->was_arming = iw_gateway_arming(self->gateway);
     for (size_t side = 0; side < IW_SIDES; side++) {
@@ -174,7 +174,7 @@ static void hear_ticks(oracle_t *self, iw_time_us_t now_us, oracle_wheel_t *whee
     const uint32_t raw = (uint32_t)bytes[0] << 24 | (uint32_t)bytes[1] << 16 | (uint32_t)bytes[2] << 8 | bytes[3];
     const uint32_t moved = raw - (uint32_t)wheel->ticks;
     const int64_t way = (moved > INT32_MAX) ? (int64_t)moved - UINT32_MAX - 1 : (int64_t)moved;
-    // 13 m/s, and 40 ticks of slack: no wheel of this kind comes near.
+    // 13 m/s, and 40 ticks of slack: no wheel of this kind is that fast.
     if (wheel->ticks_us != IW_NEVER && llabs(way) > 40 + (int64_t)((now_us - wheel->ticks_us) / (3U * MS / 2U))) {
         self->jump_now = true;
     }
@@ -182,7 +182,7 @@ static void hear_ticks(oracle_t *self, iw_time_us_t now_us, oracle_wheel_t *whee
     wheel->ticks_us = now_us;
 }
 
-/// Any telemetry of a wheel.
+/// Telemetry of a wheel was received.
 static void hear_wheel(oracle_t *self, iw_time_us_t now_us, size_t side, bool offset) {
     oracle_wheel_t *const wheel = &self->wheel[side];
     if (wheel->offset_us == IW_NEVER) {
@@ -208,7 +208,7 @@ static void hear_echo(oracle_t *self, oracle_wheel_t *wheel) {
 void oracle_received(oracle_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame) {
     const bool right = (frame->id & 32U) != 0U;
     oracle_wheel_t *const wheel = &self->wheel[right ? IW_RIGHT : IW_LEFT];
-    self->taken++;
+    self->received++;
     if (frame->id == 266U || frame->id == 298U) {
         if (frame->kind == IW_CAN_ECHO) {
             hear_echo(self, wheel);
@@ -229,7 +229,7 @@ void oracle_received(oracle_t *self, iw_time_us_t now_us, const iw_can_frame_t *
     }
 }
 
-// ---- what it sent ----------------------------------------------------------------------------------------------
+// ---- output of the gateway -------------------------------------------------------------------------------------
 
 static void judge_form(oracle_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame) {
     const iw_config_t *const config = self->config;
@@ -285,7 +285,7 @@ static void judge_change(oracle_t *self, iw_time_us_t now_us, const oracle_wheel
             oracle_break(self, now_us, 808, "current too steep: %d to %d mA", wheel->current, current);
         }
     }
-    // Late is what comes 100 ms after it was due: at most a period after the last pair, and the wait for an echo.
+    // A setpoint is late 100 ms after it was due: at most a period after the last pair, plus the wait for an echo.
     if (span_us >= GAP_US + oracle_us(self->config->period_ms) + oracle_us(self->config->echo_ms)) {
         oracle_break(self, now_us, 401, "not zero after a gap of %llu us", (unsigned long long)span_us);
     }
@@ -296,11 +296,11 @@ static iw_time_us_t ramp_span_us(const oracle_t *self) {
     return (iw_time_us_t)config->max_speed_mm_s * 1000000U / config->decel_mm_s2 + oracle_us(config->period_ms) + MS;
 }
 
-/// May a nonzero setpoint leave at all, and this one?
+/// Judges whether a nonzero setpoint may be sent at all, and with this speed and current.
 static void judge_permission(oracle_t *self, iw_time_us_t now_us, size_t side, int32_t speed, int32_t current) {
     const oracle_wheel_t *const wheel = &self->wheel[side];
     if (self->hard) {
-        oracle_break(self, now_us, 201, "%d mm/s %d mA after a stop without ramp, not armed anew since", speed,
+        oracle_break(self, now_us, 201, "%d mm/s %d mA after a stop without ramp and without a new arm", speed,
                      current);
         return;
     }
@@ -346,7 +346,7 @@ static void judge_state(oracle_t *self, iw_time_us_t now_us, bool zero, int32_t 
         oracle_break(self, now_us, 502, "sent on latching from LISTENING");
     }
     if (state == IW_STATE_LATCHED && self->state == IW_STATE_LATCHED &&
-        (self->latched_silent || (!self->kept && zeros_are_over(self, now_us, self->held_us, oracle_us(100))))) {
+        (self->latched_silent || (!self->hold_active && zeros_are_over(self, now_us, self->held_us, oracle_us(100))))) {
         oracle_break(self, now_us, 503, "sent while LATCHED and silent");
     }
     if (self->hard && zero && limit && current != self->config->max_current_mA) {
@@ -371,10 +371,10 @@ void oracle_call(oracle_t *self, iw_time_us_t now_us, const iw_can_frame_t *fram
     }
     const oracle_wheel_t *const other = &self->wheel[(frames[0].id == 298U) ? IW_LEFT : IW_RIGHT];
     if (!is_zero(self, &frames[0])) {
-        oracle_break(self, now_us, 608, "%d mm/s for one wheel in a call of its own", word(&frames[0].data[1]));
+        oracle_break(self, now_us, 608, "%d mm/s for one wheel in a separate call", word(&frames[0].data[1]));
     }
     if (other->pending == 0U && !other->tried_now) {
-        oracle_break(self, now_us, 609, "a zero for one wheel, and none for the other, which waits for no echo");
+        oracle_break(self, now_us, 609, "a zero for one wheel and none for the other, which has no pending echo");
     }
 }
 
@@ -415,11 +415,11 @@ void oracle_sent(oracle_t *self, iw_time_us_t now_us, const iw_can_frame_t *fram
     }
 }
 
-/// Silence is silent: once the zeros have ended, what is not echoed in time is taken back in the next step.
+/// Nothing may be sent in silence: after the last zero, the next step purges each setpoint that is not echoed in time.
 static void judge_silence(oracle_t *self, iw_time_us_t now_us, iw_time_us_t handed_us) {
     const iw_time_us_t given_us = oracle_us(self->config->echo_ms) + oracle_us(self->config->period_ms) + 10U * MS;
     const bool runs = now_us - self->step_us < oracle_us(self->config->period_ms) + 10U * MS &&
-                      now_us - self->late_us > given_us && self->taken < DRAIN;
+                      now_us - self->late_us > given_us && self->received < DRAIN;
     if (self->purges && runs && oracle_elapsed(now_us, self->silent_us, given_us)) {
         oracle_break(self, now_us, 607, "a setpoint of %llu us ago came out in silence although the port purges",
                      (unsigned long long)(now_us - handed_us));
@@ -435,7 +435,7 @@ void oracle_on_bus(oracle_t *self, iw_time_us_t now_us, const iw_can_frame_t *fr
     }
     judge_silence(self, now_us, handed_us);
     if (!zero && wheel->after_stale) {
-        oracle_break(self, now_us, 604, "%d mm/s right behind an old frame", speed);
+        oracle_break(self, now_us, 604, "%d mm/s directly after an old frame", speed);
     }
     wheel->after_stale = false;
     if (!zero && !self->armed && self->edge_us != 0U && self->hard && ++wheel->old_on_bus > 1U) {
@@ -450,7 +450,7 @@ void oracle_on_bus(oracle_t *self, iw_time_us_t now_us, const iw_can_frame_t *fr
     }
 }
 
-// ---- what follows from it --------------------------------------------------------------------------------------
+// ---- consequences ----------------------------------------------------------------------------------------------
 
 static void judge_armed(oracle_t *self, iw_time_us_t now_us) {
     if (self->armed) {
@@ -460,7 +460,7 @@ static void judge_armed(oracle_t *self, iw_time_us_t now_us) {
         return;
     }
     if (self->pending_arm == IW_CLIENT_NONE) {
-        oracle_break(self, now_us, 304, "ARMED although nobody may be");
+        oracle_break(self, now_us, 304, "ARMED although no client may be");
         return;
     }
     if (self->wheel[IW_LEFT].proven_us < self->arm_us || self->wheel[IW_RIGHT].proven_us < self->arm_us) {
@@ -490,7 +490,7 @@ bool oracle_rested(const oracle_t *self, iw_time_us_t now_us, iw_time_us_t span_
     return true;
 }
 
-/// What is armed from here on sends anew. A pair of this very microsecond may be its first: proof counts by when it was sent.
+/// A client that arms from here on sends again. A pair of this microsecond may be its first: proof counts by the time of sending.
 static void forget_sent(oracle_t *self, iw_time_us_t now_us) {
     for (size_t side = 0; side < IW_SIDES; side++) {
         if (self->wheel[side].sent_us < now_us) {
@@ -517,7 +517,7 @@ static void begin_latch(oracle_t *self, iw_time_us_t now_us) {
     }
 }
 
-/// The public state changed, or may have: after every step and every request.
+/// The public state has changed, or may have: called after every step and every request.
 void oracle_observe(oracle_t *self, iw_time_us_t now_us) {
     const iw_state_t state = iw_gateway_state(self->gateway);
     if (state == IW_STATE_ARMED) {
@@ -530,7 +530,7 @@ void oracle_observe(oracle_t *self, iw_time_us_t now_us) {
     }
     oracle_judge_hold_state(self, now_us, state);
     if (state == IW_STATE_STOPPING && self->state != IW_STATE_STOPPING) {
-        // A reset that does not end the hold leaves its time as it is.
+        // A reset that does not end the hold does not change its time.
         self->stopped_us = (self->state == IW_STATE_LATCHED) ? self->held_us : now_us;
     }
     if (state == IW_STATE_LISTENING && self->state == IW_STATE_ARMED) {
@@ -544,8 +544,8 @@ void oracle_observe(oracle_t *self, iw_time_us_t now_us) {
                          (unsigned long long)(now_us - self->stopped_us));
         }
     }
-    // A request before the first step after a stall finds the state of before it.
-    if (state == IW_STATE_STOPPING && !self->kept && now_us - self->released_us > oracle_us(1000) &&
+    // A request before the first step after a stall finds the earlier state.
+    if (state == IW_STATE_STOPPING && !self->hold_active && now_us - self->released_us > oracle_us(1000) &&
         zeros_are_over(self, now_us, self->stopped_us, oracle_us(1300)) && now_us - self->late_us > oracle_us(1000) &&
         now_us - self->step_us < GAP_US) {
         oracle_break(self, now_us, 507, "STOPPING without end");
@@ -553,7 +553,7 @@ void oracle_observe(oracle_t *self, iw_time_us_t now_us) {
     if (state == IW_STATE_LISTENING && !iw_gateway_arming(self->gateway)) {
         forget_sent(self, now_us);
     }
-    // The dead process may have left two of each wheel in its controller.
+    // The dead process may have left two setpoints of each wheel in its controller.
     const bool other = self->foreign > 4U;
     if (self->restarting && state == IW_STATE_LISTENING && !other &&
         !oracle_elapsed(now_us, self->stopped_us, oracle_us(self->config->zero_hold_ms))) {

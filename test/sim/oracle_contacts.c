@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Two contacts of the e-stop: pressed by either, released by both, and a difference that lasts is told until it is mended.
+// Two contacts of the e-stop: either presses, both release, and a lasting difference is reported until it is fixed.
 #include "oracle_parts.h"
 
-void oracle_contacts(oracle_t *self, iw_time_us_t now_us, const int said[2], int result) {
-    const bool readable = said[0] >= 0 && said[1] >= 0;
-    const unsigned pressed = ((said[0] > 0) ? 1U : 0U) + ((said[1] > 0) ? 1U : 0U);
+void oracle_contacts(oracle_t *self, iw_time_us_t now_us, const int reading[2], int result) {
+    const bool readable = reading[0] >= 0 && reading[1] >= 0;
+    const unsigned pressed = ((reading[0] > 0) ? 1U : 0U) + ((reading[1] > 0) ? 1U : 0U);
     if (result == 0 && (!readable || pressed > 0U)) {
         oracle_break(self, now_us, 815, "released although a contact says otherwise");
     }
@@ -26,12 +26,13 @@ void oracle_contacts(oracle_t *self, iw_time_us_t now_us, const int said[2], int
     }
 }
 
-/// A contact that cannot be read makes the whole unreadable, which is another cause.
+/// A contact that cannot be read makes the e-stop unreadable, which is another cause.
 void oracle_judge_contacts(oracle_t *self, iw_time_us_t now_us) {
     const uint32_t present = iw_permit_present(&self->gateway->permit, now_us);
-    const bool told = (present & (1U << IW_CAUSE_ESTOP_DISAGREES)) != 0U;
-    if (self->estop >= 0 && told != self->quarrel) {
-        oracle_break(self, now_us, 816, "contacts that %s", told ? "agree are told to disagree" : "disagree unseen");
+    const bool reported = (present & (1U << IW_CAUSE_ESTOP_DISAGREES)) != 0U;
+    if (self->estop >= 0 && reported != self->quarrel) {
+        oracle_break(self, now_us, 816, "contacts that %s",
+                     reported ? "agree are reported to disagree" : "disagree are not reported");
     }
 }
 

@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: MIT
-// Currents that are limits: never so low that a wheel has no torque, never unequal unless configured, and full again in any stop.
+// Currents that are limits: never too low for any torque, never unequal unless configured, and at the maximum again after any stop.
 #include "oracle_parts.h"
 
 /// 4000 mA/s, and the rounding of both ends.
 #define FALL_US_PER_MA 250U
 #define FALL_SLACK_MA  1
 
-/// Ours, written anew: the lower of both configured bounds.
+/// The lower of both configured bounds, computed independently of the core.
 static int32_t lowest_mA(const iw_config_t *config) {
     return (config->max_current_mA < config->min_current_mA) ? config->max_current_mA : config->min_current_mA;
 }
 
-/// Where a limit is going: fully up without a command that is in force, else to what was applied.
+/// The target of a limit: the maximum without a valid command, otherwise the applied limit.
 static int32_t wanted_mA(const oracle_t *self, size_t side) {
     const bool commanded =
         self->armed && self->fresh && self->ramp_us == IW_NEVER && iw_gateway_state(self->gateway) == IW_STATE_ARMED;
@@ -35,12 +35,12 @@ void oracle_judge_limit(oracle_t *self, iw_time_us_t now_us, size_t side, const 
         oracle_break(self, now_us, 303, "limit %d mA although %d mA were wanted", limit_mA, wanted);
     }
     if (wheel->accepted_now || wheel->current == 0 || wheel->tried_us == IW_NEVER) {
-        return; // Refused by the port, or the first one: nothing to compare with.
+        return; // The port refused it, or it is the first one: there is no earlier limit.
     }
     if (limit_mA < wheel->current - fall_mA) {
         oracle_break(self, now_us, 810, "the limit fell from %d to %d mA", wheel->current, limit_mA);
     }
-    // A zero may always have all there is.
+    // A zero may always have the maximum.
     if (moves && limit_mA > wanted && limit_mA > wheel->current) {
         oracle_break(self, now_us, 811, "the limit rose to %d mA although %d mA were wanted", limit_mA, wanted);
     }
@@ -49,7 +49,7 @@ void oracle_judge_limit(oracle_t *self, iw_time_us_t now_us, size_t side, const 
     }
 }
 
-/// The answer to a drive against the request: as large as the larger side, within the bounds; all there is for two zero speeds.
+/// Compares the reply to a drive with the request: as large as the larger side, within the bounds; the maximum for two zero speeds.
 void oracle_judge_applied_limits(oracle_t *self, iw_time_us_t now_us, const iw_drive_t *request,
                                  const iw_applied_t *applied) {
     const iw_config_t *const config = self->config;

@@ -3,7 +3,7 @@
 
 #include <stdlib.h>
 
-/// A step this late stops the wheels before anything else.
+/// A step that is late by this much stops the wheels before anything else.
 #define US_LATE (100U * MS)
 
 static void judge_start(oracle_t *self, iw_time_us_t now_us, uint32_t rule, const char *what) {
@@ -17,18 +17,18 @@ static void judge_start(oracle_t *self, iw_time_us_t now_us, uint32_t rule, cons
         oracle_break(self, now_us, rule + 2U, "%s although there was a second master", what);
     }
     if (self->nonzero_drive_us != IW_NEVER && !oracle_elapsed(now_us, self->nonzero_drive_us, STALE_US)) {
-        oracle_break(self, now_us, rule + 3U, "%s although somebody was sending commands", what);
+        oracle_break(self, now_us, rule + 3U, "%s although a client was sending commands", what);
     }
     for (size_t side = 0; side < IW_SIDES; side++) {
         const oracle_wheel_t *const wheel = &self->wheel[side];
-        // What the last step saw: a request may come before the next one.
+        // Input of the last step: a request may come before the next one.
         const iw_time_us_t seen_us = self->step_us;
         if (wheel->fresh_us == IW_NEVER ||
             oracle_elapsed(seen_us, wheel->fresh_us, oracle_us(self->config->wheel_silent_ms))) {
-            oracle_break(self, now_us, rule + 4U, "%s although a wheel was not heard", what);
+            oracle_break(self, now_us, rule + 4U, "%s although a wheel was offline", what);
         }
         if (!oracle_elapsed(seen_us, wheel->rest_us, oracle_us(self->config->rest_ms))) {
-            oracle_break(self, now_us, rule + 5U, "%s although a wheel was not at rest", what);
+            oracle_break(self, now_us, rule + 5U, "%s although a wheel was not at standstill", what);
         }
     }
 }
@@ -41,9 +41,9 @@ void oracle_arm(oracle_t *self, iw_time_us_t now_us, iw_client_t client, bool ta
             oracle_break(self, now_us, 320, "armed although LATCHED");
         }
         if ((self->holder != IW_CLIENT_NONE || self->pending_arm != IW_CLIENT_NONE) && !takeover) {
-            oracle_break(self, now_us, 321, "armed although somebody else holds the lease");
+            oracle_break(self, now_us, 321, "armed although another client holds the lease");
         }
-        // Asked before the first step after a stall, what counts is that the late stop comes first.
+        // For a request before the first step after a stall, the late stop comes first.
         if (now_us - self->step_us < US_LATE && (self->wheel[IW_LEFT].speed != 0 || self->wheel[IW_RIGHT].speed != 0)) {
             oracle_break(self, now_us, 322, "armed although the outputs are not zero");
         }
@@ -67,7 +67,7 @@ void oracle_arm(oracle_t *self, iw_time_us_t now_us, iw_client_t client, bool ta
     oracle_observe(self, now_us);
 }
 
-/// No limit makes a wheel faster than asked, changes its sign, or moves one that was commanded 0.
+/// No limit makes a wheel faster than requested, changes its sign, or moves a wheel whose command is 0.
 static bool is_beyond(int32_t applied, int32_t asked) {
     return abs(applied) > abs(asked) || (applied != 0 && (applied < 0) != (asked < 0));
 }
@@ -86,12 +86,12 @@ static void judge_applied(oracle_t *self, iw_time_us_t now_us, const iw_drive_t 
                      right);
     }
     if (slowed && !applied->limited) {
-        oracle_break(self, now_us, 338, "asked for %d %d mm/s, applied %d %d, not called limited", asked[0], asked[1],
-                     left, right);
+        oracle_break(self, now_us, 338, "requested %d %d mm/s, applied %d %d, not reported as limited", asked[0],
+                     asked[1], left, right);
     }
     if (is_beyond(left, asked[IW_LEFT]) || is_beyond(right, asked[IW_RIGHT])) {
-        oracle_break(self, now_us, 339, "asked for %d %d mm/s, applied %d %d: faster, or the other way", asked[0],
-                     asked[1], left, right);
+        oracle_break(self, now_us, 339, "requested %d %d mm/s, applied %d %d: faster, or in the other direction",
+                     asked[0], asked[1], left, right);
     }
     if (abs(left) > self->config->max_speed_mm_s || abs(right) > self->config->max_speed_mm_s ||
         llabs(skew) > 2 * largest || (within && slowed)) {
@@ -120,7 +120,7 @@ void oracle_drive(oracle_t *self, const oracle_asked_t *asked, const iw_drive_t 
         }
         judge_applied(self, now_us, request, applied);
         oracle_judge_applied_limits(self, now_us, request, applied);
-        // What was overtaken by a newer one takes nothing from it; the first one replaces what the arm granted.
+        // A late command, overtaken by a newer one, does not shorten its lease; the first one replaces the lease of the arm.
         const iw_time_us_t until_us = sent_us + oracle_us(self->config->lease_ms);
         self->lease_until_us = (self->fresh && self->lease_until_us > until_us) ? self->lease_until_us : until_us;
         self->fresh = true;

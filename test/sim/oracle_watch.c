@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-// What a step must have led to: latches, wheels, gaps, whole pairs.
+// The consequences that a step must have: latches, wheels, gaps, whole pairs.
 #include "oracle_parts.h"
 
 #include <stdlib.h>
 
-/// An echo that takes longer than this shows that the bus does not take frames as it should.
+/// An echo that takes longer than this shows that the bus does not accept frames in time.
 #define SLOW_ECHO_US (20U * MS)
-/// A condition that must last is judged with this much more, for the time between steps.
+/// Additional time for a condition that must last: the time between steps.
 #define MARGIN_US (70U * MS)
 /// A step this long after the last one was late: the wheels have not been compared meanwhile.
 #define LATE_STEP_US (60U * MS)
@@ -23,7 +23,7 @@ static void judge_latches(oracle_t *self, iw_time_us_t now_us, iw_state_t before
     }
     const iw_cause_t cause = (self->estop == IW_ESTOP_DISAGREES) ? IW_CAUSE_ESTOP_DISAGREES : IW_CAUSE_ESTOP_LINE;
     if (self->estop != 0 && before != IW_STATE_LATCHED && self->gateway->permit.stop.cause != cause) {
-        oracle_break(self, now_us, 205, "the e-stop is not told as the cause");
+        oracle_break(self, now_us, 205, "the e-stop is not reported as the cause");
     }
     if (sending && self->bus < IW_BUS_PASSIVE && state != IW_STATE_LATCHED) {
         oracle_break(self, now_us, 701, "not LATCHED although the bus is down or off");
@@ -45,7 +45,7 @@ static void judge_latches(oracle_t *self, iw_time_us_t now_us, iw_state_t before
     }
 }
 
-/// Offset frames that never stopped are no reboot, however long they have been coming.
+/// Offset frames without a pause are no reboot, however long they come.
 static void judge_reboot(oracle_t *self, iw_time_us_t now_us) {
     const iw_stop_t *const stop = &self->gateway->permit.stop;
     if (stop->number != self->stops && stop->cause == IW_CAUSE_WHEEL_REBOOTED &&
@@ -55,7 +55,7 @@ static void judge_reboot(oracle_t *self, iw_time_us_t now_us) {
     self->stops = stop->number;
     for (size_t side = 0; side < IW_SIDES; side++) {
         oracle_wheel_t *const wheel = &self->wheel[side];
-        // The pause of its offset frames begins anew in the step that finds the reboot, not with the next frame.
+        // The pause of its offset frames restarts in the step that finds the reboot, not with the next frame.
         wheel->offset_us = (wheel->reboots != self->gateway->wheel[side].reboots) ? now_us : wheel->offset_us;
         wheel->reboots = self->gateway->wheel[side].reboots;
     }
@@ -72,39 +72,39 @@ static bool since(iw_time_us_t *since_us, iw_time_us_t now_us, bool condition, u
 
 static void judge_following(oracle_t *self, iw_time_us_t now_us, size_t side, bool comparable) {
     oracle_wheel_t *const wheel = &self->wheel[side];
-    const int32_t told = wheel->speed;
+    const int32_t commanded = wheel->speed;
     const int32_t measured = (int32_t)((int64_t)wheel->rpm * 20106 / 1000);
-    const bool against = comparable && abs(told) > 105 && abs(measured) > 105 && (told > 0) != (measured > 0);
-    const int32_t most = (abs(told) > abs(wheel->before)) ? abs(told) : abs(wheel->before);
+    const bool against = comparable && abs(commanded) > 105 && abs(measured) > 105 && (commanded > 0) != (measured > 0);
+    const int32_t most = (abs(commanded) > abs(wheel->before)) ? abs(commanded) : abs(wheel->before);
     const bool faster = comparable && abs(measured) - most > self->config->follow_mm_s + 25;
-    const bool blocked = comparable && abs(told) >= 100 && abs(measured) * 5 + 100 < abs(told) &&
+    const bool blocked = comparable && abs(commanded) >= 100 && abs(measured) * 5 + 100 < abs(commanded) &&
                          iw_gateway_state(self->gateway) == IW_STATE_ARMED;
     if (since(&wheel->against_us, now_us, against, 300)) {
         oracle_break(self, now_us, 706, "not LATCHED although a wheel turns against its command");
     }
     if (since(&wheel->faster_us, now_us, faster, self->config->follow_ms)) {
         oracle_break(self, now_us, 707, "not LATCHED although a wheel is too fast: %d instead of %d mm/s", measured,
-                     told);
+                     commanded);
     }
     if (since(&wheel->blocked_us, now_us, blocked, self->config->blocked_ms)) {
         oracle_break(self, now_us, 708, "still ARMED although a wheel is blocked");
     }
 }
 
-/// Beyond any doubt: twice the limit, and what all lags together may come to when both wheels reverse.
+/// A distance beyond any doubt: twice the limit, plus the sum of all lags when both wheels reverse.
 static int64_t far_away_nm(const oracle_t *self) {
     const int64_t lags_ms = 60 + 2 * (int64_t)self->config->wheel_silent_ms + 2 * (int64_t)self->config->period_ms;
     return 2 * (int64_t)self->config->pair_mm * 1000000 + 2 * (int64_t)self->config->max_speed_mm_s * lags_ms * 1000;
 }
 
-/// Speeds on the bus, in the machine's frame, by 192 mm as the setpoints.
+/// Difference of measured and commanded speed, in the machine's frame, for 192 mm as in setpoints.
 static int64_t difference_um_s(const oracle_t *self, size_t side) {
     const oracle_wheel_t *const wheel = &self->wheel[side];
     const int64_t away = (int64_t)wheel->rpm * 20106 - (int64_t)wheel->speed * 1000;
     return self->config->invert[side] ? -away : away;
 }
 
-/// A machine that turns by itself: judged without any lag, so only where it is far away.
+/// A machine that turns on its own: judged without any lag, so only at a large distance.
 static void judge_pair_path(oracle_t *self, iw_time_us_t now_us, bool comparable) {
     const int64_t elapsed_us = (int64_t)(now_us - self->path_at_us);
     self->path_at_us = now_us;
@@ -131,7 +131,7 @@ static void judge_wheels(oracle_t *self, iw_time_us_t now_us) {
             (wheel->fresh_us == IW_NEVER || wheel->fresh_us < wheel->excused_us) ? wheel->excused_us : wheel->fresh_us;
         const iw_time_us_t silent_us = oracle_us(self->config->wheel_silent_ms);
         const bool silent = now_us - received_us >= silent_us;
-        // Excused is not heard: what it does is known again with its next frame of known age.
+        // An excused wheel is not online: its motion is known again with its next frame of known age.
         const bool known = wheel->fresh_us != IW_NEVER && !oracle_elapsed(now_us, wheel->fresh_us, silent_us);
         comparable = comparable && known;
         offline += silent ? 1U : 0U;
@@ -140,7 +140,7 @@ static void judge_wheels(oracle_t *self, iw_time_us_t now_us) {
             continue;
         }
         if (silent) {
-            oracle_break(self, now_us, 709, "not LATCHED although a wheel was silent for %llu us",
+            oracle_break(self, now_us, 709, "not LATCHED although a wheel was offline for %llu us",
                          (unsigned long long)(now_us - received_us));
         }
         if (wheel->pending > 0U && now_us - wheel->waiting[0] >= oracle_us(self->config->echo_ms)) {
@@ -149,13 +149,13 @@ static void judge_wheels(oracle_t *self, iw_time_us_t now_us) {
         }
     }
     judge_pair_path(self, now_us, comparable);
-    // One wheel offline may ramp; with both offline nothing but zero may follow.
+    // One offline wheel may ramp; with both offline only zero may follow.
     if (offline == IW_SIDES && !self->stalled) {
         oracle_hard_stop(self);
     }
 }
 
-/// Zeros are held from the end of the ramp. What is asked is what everybody is told: iw_snapshot_t::output_zero.
+/// Zeros are held from the end of the ramp, as reported to all clients: iw_snapshot_t::output_zero.
 static void note_hold(oracle_t *self, iw_time_us_t now_us) {
     iw_snapshot_t seen;
     if (self->state != IW_STATE_LATCHED || self->latched_silent) {
@@ -167,7 +167,7 @@ static void note_hold(oracle_t *self, iw_time_us_t now_us) {
     }
 }
 
-/// While the process runs and the bus takes frames, setpoints come without a gap.
+/// While the process runs and the bus accepts frames, setpoints come without a gap.
 static void judge_gaps(oracle_t *self, iw_time_us_t now_us) {
     const iw_state_t state = iw_gateway_state(self->gateway);
     const bool holding = oracle_holds(self) || (state == IW_STATE_LATCHED && !self->latched_silent &&
@@ -202,18 +202,18 @@ static void judge_pair(oracle_t *self, iw_time_us_t now_us) {
     }
 }
 
-/// After the e-stop the first zero leaves in the very step that sees it.
+/// After the e-stop the first zero is sent in the step that reads it.
 static void judge_estop_zero(oracle_t *self, iw_time_us_t now_us, iw_state_t before) {
     for (size_t side = 0; side < IW_SIDES; side++) {
         const oracle_wheel_t *const wheel = &self->wheel[side];
         const bool first = self->estop != 0 && (before == IW_STATE_ARMED || !wheel->accepted_zero);
         if (first && sending_state(before) && self->bus >= IW_BUS_PASSIVE && !wheel->tried_now && wheel->pending < 2U) {
-            oracle_break(self, now_us, 206, "no zero at once after the e-stop");
+            oracle_break(self, now_us, 206, "no zero immediately after the e-stop");
         }
     }
 }
 
-/// Zeros end as the rules say; in LATCHED the state does not tell. As in the step itself: between two the wheels may be lost.
+/// Zeros end by the rules; in LATCHED the state does not show it. Judged per step, because the wheels may be lost between two.
 static void watch_silence(oracle_t *self, iw_time_us_t now_us) {
     const iw_state_t state = iw_gateway_state(self->gateway);
     const bool listening = state == IW_STATE_LISTENING && !iw_gateway_arming(self->gateway);
@@ -226,7 +226,8 @@ static void watch_silence(oracle_t *self, iw_time_us_t now_us) {
     const bool ended =
         (held && oracle_rested(self, now_us, SETTLED_US)) ||
         (now_us > zeros_us && oracle_elapsed(now_us, zeros_us, oracle_hold_max_us(self, since_us) + oracle_us(100)));
-    if (listening || (state == IW_STATE_LATCHED && (self->latched_silent || (!self->kept && (ended || silent))))) {
+    if (listening ||
+        (state == IW_STATE_LATCHED && (self->latched_silent || (!self->hold_active && (ended || silent))))) {
         self->silent_us = (self->silent_us == IW_NEVER) ? now_us : self->silent_us;
     } else {
         self->silent_us = IW_NEVER;
@@ -242,7 +243,7 @@ void oracle_step_end(oracle_t *self, iw_time_us_t now_us) {
         oracle_soft_stop(self, self->lease_until_us);
     }
     if (before == IW_STATE_LATCHED && iw_gateway_state(self->gateway) != IW_STATE_LATCHED) {
-        oracle_break(self, now_us, 508, "no longer LATCHED although nobody asked for a reset");
+        oracle_break(self, now_us, 508, "no longer LATCHED although no client requested a reset");
     }
     oracle_observe(self, now_us);
     note_hold(self, now_us);

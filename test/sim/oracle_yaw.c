@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: MIT
-// How fast the pair turns the machine: what was commanded, what was sent, how fast it grew.
+// Turning of the machine by the pair: the command, the setpoints, and the rise of the turning speed.
 #include "oracle_parts.h"
 
 #include <stdlib.h>
 
-/// A setpoint means its speed at this radius.
+/// Radius for which a setpoint means its speed.
 #define FIRMWARE_RADIUS_MM 192
-/// Two speeds, each cut off to a whole mm/s.
+/// Two speeds, each truncated to a whole mm/s.
 #define ROUNDING_MM_S 2
 
-/// In thousandths of a mrad/s, times the track: what a difference of setpoints turns the real machine by.
+/// Turning speed of the real machine for a difference of setpoints, in thousandths of a mrad/s, times the track.
 static int64_t turns_um_s(const oracle_t *self, int64_t difference_mm_s) {
     return llabs(difference_mm_s) * 1000 * self->config->radius_mm / FIRMWARE_RADIUS_MM;
 }
@@ -18,7 +18,7 @@ static int64_t most_um_s(const oracle_t *self) {
     return (int64_t)self->config->max_yaw_mrad_s * self->config->track_mm;
 }
 
-/// Beyond by not even the part of a mm/s that a division drops.
+/// True if the excess is more than the fraction of a mm/s that a division drops.
 bool oracle_turns_too_fast(const oracle_t *self, int32_t left_mm_s, int32_t right_mm_s) {
     return turns_um_s(self, (int64_t)right_mm_s - left_mm_s) > most_um_s(self);
 }
@@ -27,7 +27,7 @@ static int64_t ahead(const oracle_t *self, size_t side, int32_t speed) {
     return self->config->invert[side] ? -(int64_t)speed : (int64_t)speed;
 }
 
-/// Both setpoints of a pair have been handed over in this step.
+/// True if both setpoints of a pair were passed to the port in this step.
 void oracle_judge_turn(oracle_t *self, iw_time_us_t now_us) {
     const oracle_wheel_t *const left = &self->wheel[IW_LEFT];
     const oracle_wheel_t *const right = &self->wheel[IW_RIGHT];

@@ -68,7 +68,7 @@ static int send_one(rig_t *rig, const iw_can_frame_t *frame) {
     if (rig_traces(rig)) {
         printf("  %11.6f s    sends %u (0x%X) %02X %6d mm/s %5d mA%s\n", (double)rig->now_us / 1e6, frame->id,
                frame->id, frame->data[0], (int16_t)(frame->data[1] << 8 | frame->data[2]),
-               (int16_t)(frame->data[3] << 8 | frame->data[4]), (result > 0) ? "" : "   (not taken)");
+               (int16_t)(frame->data[3] << 8 | frame->data[4]), (result > 0) ? "" : "   (not accepted)");
     }
     oracle_sent(&rig->oracle, rig->now_us, frame, result > 0);
     return result;
@@ -133,7 +133,7 @@ static int port_purge(void *context) {
     return 1;
 }
 
-/// The second contact follows the first one when that has stayed so for its lag.
+/// The second contact follows the first one after it has not changed for the lag.
 static bool lag_behind(rig_t *rig, bool first) {
     if (first != rig->contact_was) {
         rig->contact_was = first;
@@ -145,19 +145,19 @@ static bool lag_behind(rig_t *rig, bool first) {
     return rig->second_contact;
 }
 
-/// When all is healed, somebody presses and releases the button if its contacts still disagree.
-static bool press_to_mend(rig_t *rig) {
+/// After all faults have ended, the operator presses and releases the button if its contacts still disagree.
+static bool press_to_clear(rig_t *rig) {
     const bool healed = rig->now_us >= SCENARIO_START_US + rig->scenario->chaos_us;
-    rig->mending = healed && rig->oracle.quarrel && !rig->mending;
-    return rig->mending;
+    rig->clearing = healed && rig->oracle.quarrel && !rig->clearing;
+    return rig->clearing;
 }
 
 static int see_both(rig_t *rig, int first) {
     const bool second = lag_behind(rig, first > 0);
-    const bool mend = press_to_mend(rig);
-    const int said[2] = {(mend && first == 0) ? 1 : first, (first < 0) ? -1 : (int)(mend || second)};
-    const int result = iw_estop_pair_see(&rig->pair, rig->now_us, said[0], said[1]);
-    oracle_contacts(&rig->oracle, rig->now_us, said, result);
+    const bool press = press_to_clear(rig);
+    const int reading[2] = {(press && first == 0) ? 1 : first, (first < 0) ? -1 : (int)(press || second)};
+    const int result = iw_estop_pair_see(&rig->pair, rig->now_us, reading[0], reading[1]);
+    oracle_contacts(&rig->oracle, rig->now_us, reading, result);
     return result;
 }
 
@@ -181,7 +181,7 @@ void port_lose_bus(rig_t *rig) {
     rig->bus_lost = true;
 }
 
-/// What the dead process had handed over is still in the queue; a new one gets a port of its own.
+/// Frames that the dead process passed to the port are still in the queue; a new process gets its own port.
 void port_restart(rig_t *rig) {
     rig->rx_count = 0;
     rig->sent_count = 0;

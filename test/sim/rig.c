@@ -5,16 +5,16 @@
 
 #define MS            1000U
 #define S             1000000U
-#define RULE_NOTHING  902U ///< A run in which nothing happened.
-#define RULE_UNUSABLE 903U ///< Everything is healed and it cannot be driven.
-#define RULE_RESTLESS 904U ///< Nobody drives and it does not come to rest and silence.
+#define RULE_NOTHING  902U ///< Nothing happened in the run.
+#define RULE_UNUSABLE 903U ///< All faults have ended and the machine cannot be driven.
+#define RULE_RESTLESS 904U ///< No client drives, and standstill and silence do not follow.
 #define RULE_INTERNAL 905U ///< The gate had to stop the scheduler, or the encoder had to clamp.
 #define QUIET_US      (1500U * MS)
 #define USABLE_US     (20U * S)
 #define DRIVEN_US     (1U * S)
 #define SETTLE_US     (14U * S)
 #define HELD_US       (30U * S)
-#define RULE_HELD     818U ///< As the oracle's own.
+#define RULE_HELD     818U ///< The oracle's rule of the same number.
 #define ODD_IDS       11U
 
 bool rig_traces(const rig_t *rig) {
@@ -31,7 +31,7 @@ bool rig_active(const rig_t *rig, unsigned kind) {
     return rig->fault_until_us[kind] > rig->now_us;
 }
 
-/// Wants the gateway to run then; how late it really does is drawn.
+/// Requests a step of the gateway at that time; its delay is drawn.
 void rig_wake(rig_t *rig, iw_time_us_t at_us) {
     uint32_t latency_us = rig->scenario->wake_latency_us;
     if (rig_active(rig, EV_LOOP_SLOW)) {
@@ -80,7 +80,7 @@ static void set_one(rig_t *rig, const event_t *event, iw_side_t side, bool on) {
     }
 }
 
-/// One wheel, or both: then they go straight, and what each of them does is judged.
+/// Applies to one wheel, or to both: then they go straight, and each is judged alone.
 static void set_wheel(rig_t *rig, const event_t *event, bool on) {
     for (unsigned side = 0; side < IW_SIDES; side++) {
         if (event->who == side || event->who == IW_SIDES) {
@@ -116,7 +116,7 @@ static void contradict(rig_t *rig, bool contradicted) {
     iw_gateway_bus_facts(&rig->gateway, &facts);
 }
 
-/// Begins or ends what lasts.
+/// Begins or ends a fault that lasts.
 static void switch_fault(rig_t *rig, const event_t *event, bool on) {
     switch (event->kind) {
     case EV_ESTOP:
@@ -240,7 +240,7 @@ static void begin_instant(rig_t *rig, const event_t *event) {
     }
 }
 
-/// One of a kind at a time: the next ends the last.
+/// Only one of a kind is active: the next ends the previous one.
 static void begin_event(rig_t *rig, const event_t *event) {
     rig->result->stats.events[event->kind]++;
     if (rig_traces(rig)) {
@@ -325,7 +325,7 @@ static iw_time_us_t next_us(const rig_t *rig) {
     return sooner(sooner(world_us, rig->fault_end_us), sooner(clients_next_us(rig), gateway_us(rig)));
 }
 
-/// Everything that is due by `until_us`, in its order; events of the scenario are the caller's.
+/// Does all that is due by `until_us`, in order; the caller handles the events of the scenario.
 static void run_until(rig_t *rig, iw_time_us_t until_us) {
     sim_delivery_t delivery;
     while (rig->oracle.rule == ORACLE_NO_RULE) {
@@ -349,7 +349,7 @@ static void run_until(rig_t *rig, iw_time_us_t until_us) {
     rig->now_us = (until_us > rig->now_us) ? until_us : rig->now_us;
 }
 
-// ---- the end: everything healed --------------------------------------------------------------------------------
+// ---- the end: all faults have ended ----------------------------------------------------------------------------
 
 static void heal(rig_t *rig) {
     for (unsigned kind = 0; kind < EV_KINDS; kind++) {
@@ -364,7 +364,7 @@ static void heal(rig_t *rig) {
         sim_wheel_slow(&rig->world.pair.wheel[side], rig->scenario->slow_permille);
     }
     clients_all_gone(rig);
-    port_lose_bus(rig); // The interface is taken down and up: what was swallowed is forgotten.
+    port_lose_bus(rig); // The interface goes down and up: the lost frames are dropped.
 }
 
 static bool turning(const rig_t *rig) {
@@ -379,12 +379,12 @@ static bool standing(const rig_t *rig) {
     return wheel[IW_LEFT].motion.speed_um_s == 0 && wheel[IW_RIGHT].motion.speed_um_s == 0;
 }
 
-/// Without a track every arm is refused, whoever asks and however often.
+/// Without a track every arm is refused, whichever client sends it and however often.
 static bool may_move(const rig_t *rig) {
     return rig->scenario->config.track_mm != 0U;
 }
 
-/// True if it is driven for DRIVEN_US on end before that time. A reboot may come to light late and stop it once more.
+/// Returns true if a client drives for DRIVEN_US without a break before that time. A late detection of a reboot may stop it once more.
 static bool gets_driven(rig_t *rig, iw_time_us_t limit_us) {
     iw_time_us_t since_us = rig->now_us;
     while (rig->now_us < limit_us && rig->oracle.rule == ORACLE_NO_RULE) {
@@ -398,7 +398,7 @@ static bool gets_driven(rig_t *rig, iw_time_us_t limit_us) {
     return false;
 }
 
-/// True if the wheels stand and nothing is sent for a second before that time.
+/// Returns true if, before that time, the wheels are at standstill and nothing is sent for a second.
 static bool comes_to_rest(rig_t *rig, iw_time_us_t limit_us) {
     while (rig->now_us < limit_us && rig->oracle.rule == ORACLE_NO_RULE) {
         const uint64_t frames = rig->result->stats.frames;
@@ -410,29 +410,30 @@ static bool comes_to_rest(rig_t *rig, iw_time_us_t limit_us) {
     return false;
 }
 
-/// The zeros of a hold end by nothing else.
+/// The zeros of a hold have no other end.
 static void release_at_rest(rig_t *rig) {
     const event_t release = {.kind = EV_ONE_RELEASE};
-    if (rig->scenario->config.hold && may_move(rig)) { // Else nothing ever began that could be held.
+    if (rig->scenario->config.hold && may_move(rig)) { // Otherwise no motion ever began that could end in a hold.
         run_until(rig, rig->now_us + HELD_US);
         if (iw_gateway_state(&rig->gateway) == IW_STATE_LISTENING) {
-            oracle_fail(&rig->oracle, rig->now_us, RULE_HELD, "nobody has released it, and nothing is sent");
+            oracle_fail(&rig->oracle, rig->now_us, RULE_HELD, "no client has released the hold, and nothing is sent");
         }
         clients_start(rig, &release);
     }
 }
 
-/// A well-behaved client must get its way now, and when it has gone the wheels stand and the bus is silent.
+/// A well-behaved client must be able to drive now; after it has gone, the wheels are at standstill and the bus is silent.
 static void prove_usable(rig_t *rig) {
     const event_t drives = {.span_us = 60U * S, .a = 200, .b = 180, .kind = EV_GOOD_CLIENT, .style = 3U};
     clients_start(rig, &drives);
     if (!gets_driven(rig, rig->now_us + USABLE_US) && may_move(rig)) {
-        oracle_fail(&rig->oracle, rig->now_us, RULE_UNUSABLE, "all faults are gone, but it cannot be driven");
+        oracle_fail(&rig->oracle, rig->now_us, RULE_UNUSABLE,
+                    "all faults have ended, but the machine cannot be driven");
     }
     clients_all_gone(rig);
     release_at_rest(rig);
     if (!comes_to_rest(rig, rig->now_us + SETTLE_US)) {
-        oracle_fail(&rig->oracle, rig->now_us, RULE_RESTLESS, "nobody drives, but it does not come to rest");
+        oracle_fail(&rig->oracle, rig->now_us, RULE_RESTLESS, "no client drives, but standstill does not follow");
     }
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 /// Plays a scenario: the real core on a simulated bus with simulated wheels, ports, clients and button, in virtual
-/// time, judged by the oracle. A pure function of the scenario.
+/// time, judged by the oracle. The result depends only on the scenario.
 #ifndef SIM_TEST_RIG_H
 #define SIM_TEST_RIG_H
 
@@ -9,12 +9,12 @@
 
 #define RIG_REFUSALS ((unsigned)IW_REFUSALS)
 
-/// What a run, or a campaign of runs, consisted of.
+/// Contents of a run, or of a campaign of runs.
 typedef struct {
     uint64_t simulated_us;
     uint64_t steps;
-    uint64_t frames;  ///< Setpoints handed over.
-    uint64_t nonzero; ///< Of them.
+    uint64_t frames;  ///< Setpoints passed to the port.
+    uint64_t nonzero; ///< Nonzero ones of these.
     uint64_t requests;
     uint64_t armed;
     uint64_t drives; ///< Accepted.
@@ -27,11 +27,11 @@ typedef struct {
     uint32_t rule; ///< ORACLE_NO_RULE: passed.
     iw_time_us_t broken_us;
     char text[200];
-    uint64_t hash; ///< Of everything sent and answered.
+    uint64_t hash; ///< Hash of all that was sent and replied.
     rig_stats_t stats;
 } rig_result_t;
 
-/// `trace_from_us`: from then on what happens is told on stdout; IW_NEVER: nothing is.
+/// `trace_from_us`: prints a timeline on stdout from then on; IW_NEVER: none.
 void rig_play(const scenario_t *scenario, iw_time_us_t trace_from_us, rig_result_t *out_result);
 
 void rig_stats_add(rig_stats_t *sum, const rig_stats_t *stats);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// What the parts of the rig share: the port (port.c), the clients (clients.c) and the play itself (rig.c).
+/// Interface between the parts of the rig: the port (port.c), the clients (clients.c) and the run itself (rig.c).
 #ifndef SIM_TEST_RIG_PARTS_H
 #define SIM_TEST_RIG_PARTS_H
 
@@ -12,14 +12,14 @@
 
 typedef struct {
     iw_can_frame_t frame;
-    iw_time_us_t at_us; ///< When it is delivered, or handed on.
+    iw_time_us_t at_us; ///< Time of its delivery to the gateway or to the bus.
     iw_time_us_t handed_us;
 } held_t;
 
-/// A client's program. Modes are the kinds of event that start them.
+/// A client's program. Its modes are the kinds of event that start them.
 typedef struct {
     iw_client_t id;
-    uint8_t mode; ///< EV_KINDS: does nothing.
+    uint8_t mode; ///< EV_KINDS: idle.
     uint8_t style;
     iw_time_us_t until_us;
     iw_time_us_t next_us;
@@ -27,7 +27,7 @@ typedef struct {
     int32_t b;
 } client_t;
 
-/// A request that waits for a process that does not run.
+/// A request that waits for a stopped process.
 typedef struct {
     uint8_t kind;
     iw_client_t id;
@@ -48,10 +48,10 @@ typedef struct {
     iw_time_us_t promised_us;
     iw_time_us_t fault_until_us[EV_KINDS]; ///< 0: not active.
     event_t fault[EV_KINDS];
-    iw_time_us_t fault_end_us; ///< The earliest of them.
+    iw_time_us_t fault_end_us; ///< The earliest end.
     held_t rx[RIG_RX_MAX];
-    held_t tx[RIG_TX_MAX];         ///< Held back by the adapter.
-    iw_time_us_t sent[RIG_TX_MAX]; ///< When the frames in the controller's queue were handed over.
+    held_t tx[RIG_TX_MAX];         ///< Frames that the adapter delays.
+    iw_time_us_t sent[RIG_TX_MAX]; ///< Times when the frames in the controller's queue were passed to it.
     uint32_t rx_first, rx_count, tx_first, tx_count, sent_first, sent_count;
     client_t client[SCENARIO_CLIENTS];
     iw_client_t next_client;
@@ -62,11 +62,11 @@ typedef struct {
     uint8_t port;
     bool alive;
     bool edge;
-    iw_estop_pair_t pair;    ///< The port's, of two contacts.
-    iw_time_us_t contact_us; ///< When the first of them last changed.
+    iw_estop_pair_t pair;    ///< The port's logic for two contacts.
+    iw_time_us_t contact_us; ///< Time of the last change of the first contact.
     bool contact_was;
     bool second_contact;
-    bool mending;
+    bool clearing;
     bool bus_lost;
     uint32_t stops_seen;
     iw_state_t state_seen;

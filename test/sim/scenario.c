@@ -9,7 +9,7 @@
 #define S  1000000U
 #define MS 1000U
 
-/// How an event of a kind is drawn. Spans are drawn log-uniformly, so that short ones are as frequent as long ones.
+/// How an event of a kind is drawn. Spans are drawn log-uniformly, so that short ones are as likely as long ones.
 typedef struct {
     const char *name;
     uint32_t span_min_us;
@@ -25,18 +25,18 @@ static const draw_t draws[EV_KINDS] = {
     [EV_BUS_DOWN] = {"bus down", 1 * MS, 2 * S, 0, 0, 1},
     [EV_BUS_OFF] = {"bus-off", 1 * MS, 2 * S, 0, 0, 1},
     [EV_PASSIVE] = {"error passive", 1 * MS, 2 * S, 0, 0, 1},
-    [EV_NO_ACK] = {"nobody acknowledges", 1 * MS, 14 * S, 0, 0, 1},
-    [EV_BUS_STALL] = {"bus takes no frame", 1 * MS, 1 * S, 0, 0, 1},
-    [EV_TX_FULL] = {"port takes no frame", 1 * MS, 1 * S, 0, 0, 1},
-    [EV_TX_RIGHT] = {"port takes no frame for the right", 1 * MS, 1 * S, 0, 0, 1},
-    [EV_TX_HOLD] = {"adapter holds what is sent", 50 * MS, 3 * S, 200, 120 * MS, 1},
+    [EV_NO_ACK] = {"no acknowledgement", 1 * MS, 14 * S, 0, 0, 1},
+    [EV_BUS_STALL] = {"bus accepts no frame", 1 * MS, 1 * S, 0, 0, 1},
+    [EV_TX_FULL] = {"port accepts no frame", 1 * MS, 1 * S, 0, 0, 1},
+    [EV_TX_RIGHT] = {"port accepts no frame for the right", 1 * MS, 1 * S, 0, 0, 1},
+    [EV_TX_HOLD] = {"adapter delays sent frames", 50 * MS, 3 * S, 200, 120 * MS, 1},
     [EV_TX_LOST] = {"adapter swallows frames", 0, 0, 1, 4, 1},
     [EV_RX_HOLD] = {"adapter delivers late", 50 * MS, 3 * S, 200, 60 * MS, 1},
     [EV_ECHO_LOST] = {"echoes lost", 0, 0, 1, 3, 1},
     [EV_FOREIGN] = {"second master", 1, 1 * S, 0, 0, 1},
     [EV_BABBLE] = {"babbling node", 10 * MS, 1 * S, 0, 2047, 1},
     [EV_ODD_FRAMES] = {"odd frames", 0, 0, 1, 20, 1},
-    [EV_MUTE] = {"wheel silent", 5 * MS, 2 * S, 0, 0, 2},
+    [EV_MUTE] = {"wheel offline", 5 * MS, 2 * S, 0, 0, 2},
     [EV_REBOOT] = {"wheel reboots", 0, 0, 3 * MS, 800 * MS, 2},
     [EV_POWER] = {"wheels without power", 20 * MS, 14 * S, 0, 0, 1},
     [EV_LOSS] = {"wheel loses frames", 100 * MS, 5 * S, 10, 950, 2},
@@ -89,7 +89,7 @@ static uint32_t log_span(sim_random_t *random, uint32_t low, uint32_t high) {
     return (base < high / 2U) ? between(random, base, 2U * base) : between(random, base, high);
 }
 
-/// By seed: as configured by default; so that both, one, or hardly any limit is met.
+/// Depends on the seed: the default configuration, or limits that all, one or hardly any commands reach.
 static const struct {
     uint16_t max_mrad_s;
     uint16_t accel_mrad_s2;
@@ -113,7 +113,7 @@ static void draw_config(scenario_t *self, sim_random_t *random) {
         config->echo_ms = (uint16_t)between(random, 20, 90);
         config->setpoint_dlc = (uint16_t)between(random, 5, 8);
     }
-    // What is slower by so much needs limits to match.
+    // A slower wheel needs limits that match.
     config->wheel_lag_ms = (uint16_t)(60U + self->slow_permille * 2U / 1000U);
     config->pair_mm = (uint16_t)(60U + self->seed % 4U * 30U);
     config->min_current_mA = (uint16_t)(300U + self->seed % 5U * 200U);
@@ -159,18 +159,18 @@ static void draw_event(event_t *event, unsigned kind, sim_random_t *random) {
     }
 }
 
-/// Events of one kind, spread over the run.
+/// Draws events of one kind, spread over the run.
 static void draw_kind(scenario_t *self, unsigned kind, uint32_t number, sim_random_t *random) {
     for (uint32_t i = 0; i < number && self->count < SCENARIO_EVENTS; i++) {
         event_t *const event = &self->event[self->count++];
-        // One draw a statement: C leaves open which part of an expression comes first.
+        // One draw per statement: C leaves the order of evaluation inside an expression open.
         event->at_us = sim_random_below(random, (uint32_t)(self->chaos_us / MS)) * (iw_time_us_t)MS;
         event->at_us += sim_random_below(random, MS);
         draw_event(event, kind, random);
     }
 }
 
-/// A total order, so that every library sorts alike.
+/// A total order, so that every library sorts in the same way.
 static int by_time(const void *a, const void *b) {
     const event_t *const one = a;
     const event_t *const other = b;
@@ -191,7 +191,7 @@ static int by_time(const void *a, const void *b) {
     return 0;
 }
 
-/// By seed: well within what is allowed, just within, beyond it, and as good as shorted.
+/// Depends on the seed: well within the allowed range, barely within, beyond it, and almost shorted.
 static const iw_time_us_t contact_lags_ms[] = {0, 90, 180, 300, 10000};
 
 void scenario_draw(scenario_t *self, uint64_t seed) {

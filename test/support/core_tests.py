@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Which unit tests can run on another machine: those that need nothing but the core, Unity and test/support; and what one of them said."""
+"""Finds the unit tests that can run on another machine: those that need only the core, Unity and test/support. Counts the tests in their output."""
 
 import os
 import re
@@ -13,7 +13,7 @@ INCLUDE = re.compile(r'^#include "([^"]+)"', re.MULTILINE)
 
 
 def listed_tests():
-    """{name: [sources]} of the lines iwheel_unit_test(name sources...) whose words are plain, after set() is put in."""
+    """{name: [sources]} of the lines iwheel_unit_test(name sources...) that consist of plain words after the variables of set() are replaced."""
     text = re.sub(r"foreach\(.*?endforeach\(\)", "", (UNIT / "CMakeLists.txt").read_text(), flags=re.DOTALL)
     for name, value in re.findall(r"set\((\w+) ([^)]*)\)", text):
         text = text.replace("${" + name + "}", value)
@@ -21,7 +21,7 @@ def listed_tests():
 
 
 def needs_only_core(sources):
-    """True if everything that is included, directly or not, belongs to the core, Unity or the tests' support."""
+    """True if every file that is included, directly or indirectly, belongs to the core, Unity or test/support."""
     todo, seen = list(sources), set()
     while todo:
         path = todo.pop()
@@ -47,12 +47,12 @@ def unity_folder():
     """Unity's sources, which the build has found."""
     folder = Path(os.environ["IWHEEL_BUILD"], "test/target/unity_folder").read_text()
     if not folder:
-        raise unittest.SkipTest("Unity is installed as a package without sources: give its folder with -DIWHEEL_UNITY_DIR")
+        raise unittest.SkipTest("Unity is installed as a package without sources: set its folder with -DIWHEEL_UNITY_DIR")
     return folder
 
 
 def count_unity(done):
-    """How many single tests have passed; all of them, or it fails."""
+    """The number of passed tests. Raises if one failed."""
     summary = re.search(r"(\d+) Tests 0 Failures 0 Ignored", done.stdout)
     assert done.returncode == 0 and summary and int(summary[1]) > 0, (done.stdout + done.stderr)[-1500:]
     return int(summary[1])

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
-/// What the daemon's tests with one client begin and end with: setUp and tearDown, for a rig with one client that may drive.
+/// setUp and tearDown of the daemon's tests with one client: a rig with one connection that may drive.
 #ifndef TEST_DAEMON_CLIENT_H
 #define TEST_DAEMON_CLIENT_H
 
 #include "daemon_rig.h"
 
-/// Its connection. A test that closes it sets it to -1.
+/// The client's connection. A test that closes it sets it to -1.
 extern int client;
 
-/// The reply to its request has that in it.
+/// Asserts that the reply to the client's request contains this text.
 void assert_reply(const char *line, const char *part);
 
 #endif

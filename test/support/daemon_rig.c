@@ -19,7 +19,7 @@
 #include <sys/un.h>
 #include <unistd.h>
 
-/// Far beyond what this machine's own clock can be, so that its timers never come.
+/// Far later than any clock of the test machine, so its timers never expire.
 #define START_US  UINT64_C(1000000000000000)
 #define UPTIME_US UINT64_C(600000000)
 #define REPLY_MS  20U
@@ -67,9 +67,9 @@ void iwl_bus_poll(iwl_backend_store_t *self, iw_time_us_t now_us) {
     (void)now_us;
 }
 
-void iwl_bus_waited(iwl_backend_store_t *self, bool told) {
+void iwl_bus_waited(iwl_backend_store_t *self, bool ready) {
     (void)self;
-    (void)told;
+    (void)ready;
 }
 
 iw_time_us_t iwl_bus_next_us(const iwl_backend_store_t *self) {
@@ -163,8 +163,8 @@ static int rig_pressed(void *self, bool quiet) {
     if (self == &rig->daemon->wheels.hal.estop2) {
         return rig->estop2;
     }
-    const bool pulse = rig->estop_pulse && !quiet; // Without a word from the wait, edges are not read.
-    rig->looks++;
+    const bool pulse = rig->estop_pulse && !quiet; // The port reads edges only after the wait has reported the line.
+    rig->polls++;
     rig->unlooked_us = rig->now_us - rig->looked_us;
     rig->looked_us = rig->now_us;
     rig->estop_told = rig->estop;
@@ -200,11 +200,11 @@ static void take_from_world(daemon_rig_t *rig) {
 /// Makes a descriptor readable or not.
 static void show(int fd, bool readable) {
     const uint64_t one = 1;
-    uint64_t taken;
+    uint64_t count;
     if (readable) {
         (void)!write(fd, &one, sizeof one);
     } else {
-        (void)!read(fd, &taken, sizeof taken);
+        (void)!read(fd, &count, sizeof count);
     }
 }
 
@@ -231,7 +231,7 @@ void sock_wakeup_close(sock_wakeup_t *self) {
 int sock_wakeup_wait(const sock_wakeup_t *self, struct epoll_event *events, int max, iw_time_us_t now_us,
                      iw_time_us_t end_us) {
     daemon_rig_t *rig = &daemon_rig;
-    rig->wait_from_us = now_us; // Here a cycle takes no time.
+    rig->wait_from_us = now_us; // In this rig a cycle takes no time.
     rig->waits++;
     rig->now_us += rig->stolen_us;
     rig->stolen_us = 0;
@@ -244,7 +244,7 @@ int sock_wakeup_wait(const sock_wakeup_t *self, struct epoll_event *events, int 
             return count;
         }
         if (rig->now_us >= rig->until_us) {
-            errno = ECANCELED; // Ends the loop, without a cycle.
+            errno = ECANCELED; // Ends the loop without a cycle.
             return -1;
         }
         const iw_time_us_t next_us = earlier(earlier(sim_world_wake_us(&rig->world), end_us), rig->until_us);
@@ -289,7 +289,7 @@ void daemon_rig_start(void) {
         daemon->clients.listener[right] =
             (sock_listener_t){.config = {.right = (sock_right_t)right}, .fd = listen_somewhere(), .reserve_fd = -1};
     }
-    daemon->assumptions.answered = true; // Nobody keeps anything.
+    daemon->assumptions.answered = true; // This rig has no assumption store.
     daemon->assumptions.write_us = IW_NEVER;
     begin_core(daemon);
     TEST_ASSERT_EQUAL_INT(0, gw_loop_open(daemon));
@@ -370,7 +370,7 @@ int daemon_rig_connect(void) {
     return daemon_rig_connect_with(SOCK_DRIVE);
 }
 
-/// Whatever is asked: every line that is told is JSON to the letter.
+/// Asserts that a line of the gateway is correct JSON.
 static void assert_json(const char *line, size_t length) {
     static iwn_work_t work;
     static char why[128];
@@ -379,7 +379,7 @@ static void assert_json(const char *line, size_t length) {
     TEST_ASSERT_TRUE_MESSAGE(iwn_json_check(line, length, &work, &root, &fault), why);
 }
 
-/// One line of what has come, without its end. False: there is no whole one.
+/// Reads one complete line without its end. Returns false if there is none.
 static bool take_line(int client, char *out_line, size_t size) {
     const ssize_t seen = recv(client, out_line, size - 1U, MSG_PEEK | MSG_DONTWAIT);
     const char *end = (seen > 0) ? (const char *)memchr(out_line, '\n', (size_t)seen) : NULL;
@@ -395,7 +395,7 @@ static bool take_line(int client, char *out_line, size_t size) {
 
 const char *daemon_rig_ask(int client, const char *line) {
     char *reply = daemon_rig.reply;
-    while (take_line(client, reply, sizeof daemon_rig.reply)) { // Of before.
+    while (take_line(client, reply, sizeof daemon_rig.reply)) { // Earlier replies.
     }
     TEST_ASSERT_EQUAL_INT((int)strlen(line), (int)send(client, line, strlen(line), MSG_NOSIGNAL));
     TEST_ASSERT_EQUAL_INT(1, (int)send(client, "\n", 1, MSG_NOSIGNAL));

@@ -81,12 +81,12 @@ static int fake_receive(void *context, iw_can_frame_t *out_frame) {
     return 1;
 }
 
-/// A loss that is over is told once.
+/// Reports a loss that has already ended exactly once.
 static iw_bus_state_t fake_state(void *context) {
     fake_bus_t *const self = context;
-    const iw_bus_state_t told = (self->loss_untold && self->state >= IW_BUS_PASSIVE) ? IW_BUS_DOWN : self->state;
+    const iw_bus_state_t reported = (self->loss_untold && self->state >= IW_BUS_PASSIVE) ? IW_BUS_DOWN : self->state;
     self->loss_untold = false;
-    return told;
+    return reported;
 }
 
 static void forget_flights(fake_bus_t *self) {

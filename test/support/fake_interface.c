@@ -32,7 +32,7 @@ void fake_interface_put_error(uint32_t what, uint8_t controller, int flags) {
     queue->frame[(queue->first + queue->count - 1U) % FAKE_QUEUE_MAX].data[1] = controller;
 }
 
-/// The other socket never counts what it has lost; that tells the two apart.
+/// Only `ours` counts lost frames; the other socket never does.
 static fake_queue_t *queue_of(const iwl_socketcan_socket_t *self) {
     return (self->lost == UINT32_MAX) ? &fake_interface.others : &fake_interface.ours;
 }
@@ -134,7 +134,7 @@ void iwl_netlink_close(iwl_netlink_t *self) {
 }
 
 int iwl_netlink_fd(const iwl_netlink_t *self) {
-    return (int)self->sequence - 1; // As a new one has it: none.
+    return (int)self->sequence - 1; // A new socket expects no answer.
 }
 
 bool iwl_netlink_take_events(iwl_netlink_t *self) {
@@ -180,6 +180,6 @@ iwl_link_presence_t iwl_netdev_presence(int fd, const char *name, int *out_index
 
 int iwl_netdev_carrier(const char *name) {
     (void)name;
-    fake_interface.looks++;
+    fake_interface.polls++;
     return fake_interface.carrier;
 }

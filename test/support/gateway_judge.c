@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/// Rounding of both ends of a slope.
+/// Rounding error of both ends of a slope.
 #define ROUNDING_MM_S 2
 
 static void blame(gateway_judge_t *self, bool bad, const char *violation) {
@@ -53,7 +53,7 @@ static void judge_right_to_move(gateway_judge_t *self, iw_side_t side, int32_t s
     blame(self,
           state == IW_STATE_LATCHED && (!ramps || self->bus->now_us > stop->at_us + ramp_us + MS(config->period_ms)),
           "3: nonzero while latched, and no ramp of one wheel offline or of a pair that diverges");
-    blame(self, self->no_tail, "2, 7: a ramp tail where zero was due at once");
+    blame(self, self->no_tail, "2, 7: a ramp tail where zero was due immediately");
     blame(self, !self->fresh && grows, "3: motion without a fresh command");
     blame(self, self->pair_broken, "5: nonzero after a broken pair");
 }
@@ -69,7 +69,7 @@ static void judge_frame(void *context, const iw_can_frame_t *frame, bool accepte
     blame(self, self->tried[side], "7: two setpoints for one wheel in one step");
     blame(self, side == IW_LEFT && self->tried[IW_RIGHT], "right before left");
     blame(self, self->bus->unechoed[side] >= (zero ? 2U : 1U), "6: too many un-echoed setpoints");
-    blame(self, !zero && self->bus->call_frames != IW_SIDES, "5: motion for one wheel in a call of its own");
+    blame(self, !zero && self->bus->call_frames != IW_SIDES, "5: motion for one wheel in a separate call");
     blame(self, self->bus->call_frame != ((self->bus->call_frames == IW_SIDES && side == IW_RIGHT) ? 1U : 0U),
           "5: right before left in one call");
     if (!zero) {
@@ -77,7 +77,7 @@ static void judge_frame(void *context, const iw_can_frame_t *frame, bool accepte
         judge_right_to_move(self, side, command.speed_mm_s);
     }
     self->tried[side] = true;
-    self->taken[side] = accepted;
+    self->accepted[side] = accepted;
     self->step_moves = self->step_moves || !zero;
     self->frames++;
     self->moving_frames += zero ? 0U : 1U;
@@ -119,7 +119,7 @@ void gateway_judge_renew(gateway_judge_t *self) {
 
 void gateway_judge_before(gateway_judge_t *self, bool pressed, iw_time_us_t late_us) {
     memset(self->tried, 0, sizeof self->tried);
-    memset(self->taken, 0, sizeof self->taken);
+    memset(self->accepted, 0, sizeof self->accepted);
     self->step_moves = false;
     if (pressed || late_us >= IW_GATEWAY_STOP_US || self->bus->state < IW_BUS_PASSIVE) {
         self->fresh = false;
@@ -133,9 +133,9 @@ void gateway_judge_before(gateway_judge_t *self, bool pressed, iw_time_us_t late
 static void judge_gap(gateway_judge_t *self) {
     const fake_bus_t *const bus = self->bus;
     const bool sending = iw_permit_demand(&self->gateway->permit) != IW_DEMAND_SILENCE;
-    const bool takes = bus->state >= IW_BUS_PASSIVE && bus->acknowledged && bus->send_result[IW_LEFT] > 0 &&
-                       bus->send_result[IW_RIGHT] > 0 && bus->flights == 0;
-    if (!sending || !takes) {
+    const bool accepts = bus->state >= IW_BUS_PASSIVE && bus->acknowledged && bus->send_result[IW_LEFT] > 0 &&
+                         bus->send_result[IW_RIGHT] > 0 && bus->flights == 0;
+    if (!sending || !accepts) {
         self->gap_us = bus->now_us;
     }
     for (size_t side = 0; side < IW_SIDES; side++) {
@@ -146,8 +146,8 @@ static void judge_gap(gateway_judge_t *self) {
 
 static void judge_pair(gateway_judge_t *self) {
     const bool tried = self->tried[IW_LEFT] || self->tried[IW_RIGHT];
-    const bool whole = self->taken[IW_LEFT] && self->taken[IW_RIGHT];
-    blame(self, self->step_moves && self->taken[IW_LEFT] && !self->tried[IW_RIGHT], "5: left without right");
+    const bool whole = self->accepted[IW_LEFT] && self->accepted[IW_RIGHT];
+    blame(self, self->step_moves && self->accepted[IW_LEFT] && !self->tried[IW_RIGHT], "5: left without right");
     if (tried) {
         self->pair_broken = self->step_moves && !whole;
     }
@@ -159,5 +159,5 @@ void gateway_judge_after(gateway_judge_t *self, iw_time_us_t wake_us) {
     judge_gap(self);
     self->fresh = self->fresh && iw_gateway_state(self->gateway) == IW_STATE_ARMED;
     blame(self, wake_us > now_us + MS(self->config->period_ms), "wants to sleep longer than a period");
-    blame(self, wake_us <= now_us && !self->gateway->backlog, "wants to be called again at once");
+    blame(self, wake_us <= now_us && !self->gateway->backlog, "wants to be called again immediately");
 }

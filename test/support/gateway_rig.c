@@ -6,11 +6,11 @@
 
 #define SPEED_PERIOD_US  4000U
 #define STATUS_PERIOD_US 40000U
-/// Of a longer stall, what the wheels sent before is left out: it would not fit the queue.
+/// After a longer stall, earlier frames of the wheels are left out: they would not fit into the queue.
 #define STALL_SENDING_US 1000000U
-/// 1 rpm of a wheel of 192 mm.
+/// Speed of 1 rpm for a wheel with a radius of 192 mm.
 #define UM_S_PER_RPM 20106
-/// More steps at one time than any drain of a full queue takes.
+/// More steps at one time than the processing of a full queue needs.
 #define STEPS_AT_ONCE_MAX 1000U
 
 void gateway_rig_init(gateway_rig_t *self) {
@@ -45,7 +45,7 @@ void gateway_rig_power_on(gateway_rig_t *self) {
     begin_at(self, 0, false);
 }
 
-/// What the wheel does: what it was told last, until its own watchdog stops it.
+/// Moves the wheel as last commanded, until its own watchdog stops it.
 static int16_t rpm_of(const gateway_rig_t *self, size_t side) {
     const fake_bus_t *const bus = &self->bus;
     if (self->wheel[side].rpm_fixed) {
@@ -115,7 +115,7 @@ void gateway_rig_run(gateway_rig_t *self, iw_time_us_t for_us) {
         }
         steps_now = (next_us > self->now_us) ? 0U : steps_now + 1U;
         if (steps_now > STEPS_AT_ONCE_MAX) {
-            self->judge.violation = "asks to be called again at once, for ever";
+            self->judge.violation = "asks forever to be called again immediately";
             break;
         }
         self->now_us = (next_us > self->now_us) ? next_us : self->now_us;

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-/// Golden vectors: bytes as they stand on the bus, and the values that they mean.
+/// Golden vectors: bytes as on the bus, and the values that they mean.
 ///
-/// One table for every purpose: the unit tests drive encode and decode with it, the DBC is compared with it, and the table of
-/// docs/developer/protocol.md is printed from it (test/dbc/golden_table.py, which reads this file and so wants its rows in this form).
-/// The bytes were written down from the document, not taken from the codec. Each of the eleven messages has an everyday value, the
-/// extremes of every field, minus one where there is a sign, and bytes that all differ where a swapped pair could hide.
+/// One table has several uses: the unit tests test encode and decode with it, the DBC is compared with it, and it is the source of the table in
+/// docs/developer/protocol.md (test/dbc/golden_table.py reads this file and needs its rows in this form).
+/// The bytes come from the document, not from the codec. Each of the eleven messages has an everyday value, the
+/// extremes of every field, minus one for each signed field, and bytes that all differ where a swapped pair could stay unnoticed.
 #ifndef IW_TEST_GOLDEN_VECTORS_H
 #define IW_TEST_GOLDEN_VECTORS_H
 

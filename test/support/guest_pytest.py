@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Inside the kernel of test/kernel: makes the attempts of pytest's tests that a plan of pytest_virtual.py names.
+"""Inside the kernel of test/kernel: runs the attempts of pytest's tests that a plan of pytest_virtual.py lists.
 
 usage: guest_pytest.py PLAN.json
 """
@@ -20,7 +20,7 @@ def mount(source, folder, kind, data):
 
 
 def own_tmp(folders):
-    """A /tmp of this kernel, in which there can be sockets; what is needed of the host's stays in its place."""
+    """Mounts a /tmp of this kernel, in which there can be sockets; needed files of the host stay in their places."""
     mount(b"tmpfs", TMP, b"tmpfs", "mode=1777")
     for folder in folders:
         if folder.startswith(f"{TMP}/"):
@@ -31,7 +31,7 @@ def own_tmp(folders):
 def main(path):
     plan = json.loads(Path(path).read_text(encoding="utf-8"))
     if sys.executable != plan["python"]:
-        os.execv(plan["python"], [plan["python"], "-u", __file__, path])  # With the packages of its environment.
+        os.execv(plan["python"], [plan["python"], "-u", __file__, path])  # Python must have the packages of its environment.
     own_tmp([*plan["folders"], str(Path(path).parent)])
     os.environ.update(plan["environment"])
     os.chdir(plan["root"])

@@ -45,7 +45,7 @@ int __wrap_ppoll(struct pollfd *entries, nfds_t count, const struct timespec *ti
     if (in_daemon) {
         return __real_ppoll(entries, count, timeout, mask);
     }
-    TEST_ASSERT_NOT_NULL_MESSAGE(timeout, "the bridge would wait for ever");
+    TEST_ASSERT_NOT_NULL_MESSAGE(timeout, "the bridge would wait forever");
     const iw_time_us_t end_us =
         daemon_rig.now_us + (iw_time_us_t)timeout->tv_sec * 1000000U + (iw_time_us_t)timeout->tv_nsec / 1000U;
     int ready = __real_ppoll(entries, count, &at_once, mask);

@@ -1,9 +1,9 @@
 # shellcheck shell=bash
 # SPDX-License-Identifier: MIT
-# For tests that are shell functions: `judge` runs one, `sum_up` ends with "N passed, N failed, N skipped". `out` is the folder of their logs.
+# For tests that are shell functions: `judge` runs one, `sum_up` prints "N passed, N failed, N skipped" last. `out` is the folder of their logs.
 passed=0 inconclusive=0 failed=0 skipped=0
 
-# judge NAME FUNCTION: status 77 is a skip, whose reason is the last line; 75 one whose reason in_real_time tells.
+# judge NAME FUNCTION: status 77 is a skip, and the last line is its reason; 75 is a skip too, and in_real_time prints its reason.
 judge() {
     local status=0
     ("$2") >"${out:?}/$2.log" 2>&1 8>&- || status=$?
@@ -16,7 +16,7 @@ judge() {
     return $status
 }
 
-# in_real_time NAME COMMAND...: status 75 if a stalled machine explains the failure, in each attempt.
+# in_real_time NAME COMMAND...: status 75 if a stalled machine explains the failure of each attempt.
 in_real_time() {
     python3 test/support/verdict.py --run "$@"
 }
@@ -30,7 +30,7 @@ need() {
     command -v "$1" >/dev/null || skip "$1 is missing (scripts/install_tools check brings it)"
 }
 
-# The sources as they would be released: what git knows, and what is about to be added.
+# The sources of a release: the files of git, and new files that git does not ignore.
 copy_sources() {
     mkdir -p "$1" && git ls-files -z -co --exclude-standard | while IFS= read -r -d '' file; do
         [ -f "$file" ] && [ ! -L "$file" ] && printf '%s\0' "$file"

@@ -34,7 +34,7 @@ static void arm_and_prove(permit_rig_t *self) {
     self->view.proven = false;
 }
 
-/// Moving, with the lease fed.
+/// Moving, with a valid lease.
 static void drive_off(permit_rig_t *self) {
     self->view.output_zero = false;
     self->view.at_rest = false;

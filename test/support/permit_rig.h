@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// A motion permission with what its owner would tell it, at a virtual time.
+/// A motion permission and the input of its owner, at a virtual time.
 #ifndef TEST_PERMIT_RIG_H
 #define TEST_PERMIT_RIG_H
 
@@ -10,43 +10,43 @@
 #define HOLDER ((iw_client_t)7)
 #define OTHER  ((iw_client_t)8)
 
-/// Where a test can begin. ARMING is LISTENING with a zero pair on its way.
+/// The situations in which a test can begin. ARMING is LISTENING with a zero pair in flight.
 typedef enum {
     PERMIT_LISTENING,
     PERMIT_ARMING,
     PERMIT_ARMED,
     PERMIT_STOPPING, ///< Ramping down after a client's stop.
     PERMIT_HOLDING,  ///< As STOPPING, with the output at zero and the hold begun.
-    PERMIT_LATCHED,  ///< By an internal fault while armed, zeros being held.
+    PERMIT_LATCHED,  ///< An internal fault latched it while armed; it sends zeros.
     PERMIT_SITUATIONS,
 } permit_situation_t;
 
 typedef struct {
     iw_config_t config;
-    iw_permit_view_t view; ///< Told in every step; begins with nothing speaking against motion.
+    iw_permit_view_t view; ///< Input of every step; at first nothing prevents motion.
     iw_permit_t permit;
     iw_time_us_t now_us;
 } permit_rig_t;
 
-/// A fresh permission in LISTENING that has made its first step.
+/// Begins with a new permission in LISTENING that has made its first step.
 void permit_rig_init(permit_rig_t *self);
 
 /// The same, after a crash while armed.
 void permit_rig_init_restarted(permit_rig_t *self);
 
-/// A fresh permission, with the configuration that is there, brought into that situation.
+/// Begins with a new permission, the rig's configuration and that situation.
 void permit_rig_begin(permit_rig_t *self, permit_situation_t situation);
 
-/// One step now.
+/// Makes one step now.
 void permit_rig_step(permit_rig_t *self);
 
-/// Lets time pass, then one step.
+/// Lets time pass, then makes one step.
 void permit_rig_wait(permit_rig_t *self, iw_time_us_t for_us);
 
-/// Tells a cause now, for both wheels, with detail 42.
+/// Raises a cause now, for both wheels, with detail 42.
 void permit_rig_raise(permit_rig_t *self, iw_cause_t cause);
 
-/// Asks now.
+/// Makes the request now.
 iw_refusal_t permit_rig_arm(permit_rig_t *self, iw_client_t client);
 iw_refusal_t permit_rig_takeover(permit_rig_t *self, iw_client_t client);
 iw_refusal_t permit_rig_drive(permit_rig_t *self, iw_client_t client, bool nonzero);

@@ -1,17 +1,18 @@
 # SPDX-License-Identifier: MIT
-"""pytest runs the tests, verdict.py judges them: a conclusive verdict is final, an inconclusive test runs again, alone, when all others have ended.
+"""pytest runs the tests and verdict.py judges them: a conclusive verdict is final; an inconclusive test runs again, alone, after all others have ended.
 
-Each attempt is a process of its own, so that a test that crashes or hangs is one failure and takes nothing with it. Processes without threads fork them
-(Nursery), so that nothing is imported twice. A class that prepares something once (setUpClass) is one attempt, and so are tests marked
-`together(name)`. Other plugins, as --junitxml, hear of the last attempt only. The last line is "N passed, N failed, N skipped", lines before it name what was skipped; the exit status is that of verdict.summary.
+Each attempt is a separate process, so a test that crashes or hangs is one failure and affects no other test. Processes without threads fork the
+attempts (Nursery), so modules are imported only once. A class that prepares something once (setUpClass) is one attempt, and so are tests marked
+`together(name)`. Other plugins, such as --junitxml, receive the last attempt only. The lines before the last name the skipped tests; the last line
+is "N passed, N failed, N skipped". The exit status is that of verdict.summary.
 
-    --build DIR    what is tested (build/default)           --jobs N       attempts at a time (2)
-    --virtual      in virtual time: pytest_virtual.py       --sample N     N of the tests, chosen by the hash of the commit
-    --keep         keeps the folders of the tests           --pdb          all tests in this process; nothing is judged
+    --build DIR    build under test (build/default)         --jobs N       parallel attempts (2)
+    --virtual      in virtual time: pytest_virtual.py       --sample N     N of the tests, selected by the hash of the commit
+    --keep         keeps the folders of the tests           --pdb          runs all tests in this process and judges nothing
 
-A test may collect what it finds in a fixture that is a verdict.Evidence. What `said()` of a fixture tells is shown, and judged, with a failure.
-@pytest.mark.full: only with IWHEEL_FULL=1. @pytest.mark.exact: nothing in it is a matter of time. record_property("tests", N): it counts as that many.
-What passing tests print, -rP shows.
+A fixture that is a verdict.Evidence collects the findings of a test. If a test fails, the result of a fixture's `said()` is shown and judged too.
+@pytest.mark.full: only with IWHEEL_FULL=1. @pytest.mark.exact: no result depends on time. record_property("tests", N): the test counts as N tests.
+-rP shows the output of passed tests.
 """
 
 import contextlib
@@ -33,8 +34,8 @@ import unittest
 import pytest
 import verdict
 
-LIMIT_S, FULL_LIMIT_S = 240, 7200  # of one test
-MISSING = 77  # exit status: there is no virtual time here
+LIMIT_S, FULL_LIMIT_S = 240, 7200  # limits of one test
+MISSING = 77  # exit status: this machine has no virtual time
 SKIPS = (unittest.SkipTest, pytest.skip.Exception)
 RUN = pytest.StashKey()
 pytest_plugins = ("pytest_virtual",)
@@ -43,7 +44,7 @@ pytest_plugins = ("pytest_virtual",)
 class Hooks:
     @pytest.hookspec
     def pytest_verdict_end(self, run):
-        """All tests have a verdict; what a folder concludes from them together, it may `add`."""
+        """Called after all tests have a verdict. A folder may `add` a verdict about all of them together."""
 
 
 def pytest_addhooks(pluginmanager):
@@ -53,25 +54,25 @@ def pytest_addhooks(pluginmanager):
 def pytest_addoption(parser):
     group = parser.getgroup("verdicts")
     group.addoption("--build", default="build/default", metavar="DIR", help="build directory (default: build/default)")
-    group.addoption("--jobs", type=int, default=2, metavar="N", help="tests at a time (default: 2)")
-    group.addoption("--sample", type=int, metavar="N", help="only N of the tests, others after each commit")
+    group.addoption("--jobs", type=int, default=2, metavar="N", help="parallel tests (default: 2)")
+    group.addoption("--sample", type=int, metavar="N", help="only N of the tests; each commit has another sample")
     group.addoption("--virtual", action="store_true", help="run them in virtual time, in the kernel of test/kernel")
-    group.addoption("--inside", metavar="PLAN", help="of guest_pytest.py: this is inside that kernel")
+    group.addoption("--inside", metavar="PLAN", help="set by guest_pytest.py: pytest runs inside that kernel")
     group.addoption("--keep", action="store_true", help="keep the folders with configuration and outputs")
 
 
 def pytest_configure(config):
     config.addinivalue_line("markers", "full: only with IWHEEL_FULL=1")
-    config.addinivalue_line("markers", "exact: what fails, no stall of the machine explains")
-    config.addinivalue_line("markers", "together(name): tests of this name share what they prepare: they are one attempt")
-    config.addinivalue_line("markers", f"limit(seconds): how long the test may take, if not {LIMIT_S} s; those for IWHEEL_FULL: {FULL_LIMIT_S} s")
+    config.addinivalue_line("markers", "exact: no stall of the machine explains a failure")
+    config.addinivalue_line("markers", "together(name): tests of this name share their preparation and are one attempt")
+    config.addinivalue_line("markers", f"limit(seconds): time limit of the test; default {LIMIT_S} s, for IWHEEL_FULL {FULL_LIMIT_S} s")
     if config.option.jobs < 1:
         raise pytest.UsageError("--jobs must be at least 1")
     config.option.build = os.environ["IWHEEL_BUILD"] = os.path.abspath(config.option.build)
 
 
 def pytest_collection_modifyitems(config, items):
-    """A list names the long ones too."""
+    """Without IWHEEL_FULL=1 the long tests do not run; a list of the tests names them."""
     if os.environ.get("IWHEEL_FULL") != "1" and not config.option.collectonly:
         long = [item for item in items if item.get_closest_marker("full")]
         config.hook.pytest_deselected(items=long)
@@ -83,12 +84,12 @@ def pytest_collection_modifyitems(config, items):
 
 
 def commit(folder):
-    """What is checked out; of a tree without git nothing, which is a sample too."""
+    """The commit that is checked out; empty without git, which selects a sample too."""
     return subprocess.run(["git", "rev-parse", "HEAD"], cwd=folder, capture_output=True, text=True, check=False).stdout.strip()
 
 
 def sample(items, key):
-    """In an order that the key alone decides: nobody chooses, and the same commit has the same sample."""
+    """An order that depends on the key alone: the same commit always has the same sample."""
     return sorted(items, key=lambda item: hashlib.sha256(f"{key} {item.nodeid}".encode()).digest())
 
 
@@ -101,7 +102,7 @@ def evidence_of(item):
 
 @pytest.hookimpl(wrapper=True)
 def pytest_pyfunc_call(pyfuncitem):
-    """What the evidence has found fails the test, also if it is skipped after that."""
+    """A finding of the test's Evidence fails the test, even if the test is skipped after it."""
     __tracebackhide__ = True
     result = error = None
     try:
@@ -123,19 +124,19 @@ def words_of(error):
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport(item, call):
-    """The report of each phase carries what verdict.py judges: failures with their kinds, stalls and claims."""
+    """The report of each phase carries the input of verdict.py: failures with their kinds, stalls and claims."""
     report = yield
     report.failures, report.claims = [], []
     if report.when == "call":
-        rigs = [one for one in (item.funcargs or {}).values() if not isinstance(one, type)]  # rig_type is a type, which has said nothing.
-        report.sections += [("its programs said", one.said()) for one in rigs if report.failed and hasattr(one, "said")]
+        rigs = [one for one in (item.funcargs or {}).values() if not isinstance(one, type)]  # rig_type is a type and has no output.
+        report.sections += [("output of its programs", one.said()) for one in rigs if report.failed and hasattr(one, "said")]
     if report.failed:
         error = call.excinfo.value if call.excinfo else report.longreprtext
         text = error if isinstance(error, str) else words_of(error)
-        told = verdict.of_text("\n".join([text, *(said for _, said in report.sections)]))
+        judged = verdict.of_text("\n".join([text, *(said for _, said in report.sections)]))
         if isinstance(error, verdict.Found):
             report.longrepr = str(error)
-        report.failures, report.claims = getattr(error, "failures", told.failures), told.claims
+        report.failures, report.claims = getattr(error, "failures", judged.failures), judged.claims
     evidence = evidence_of(item) if report.when == "call" else []
     report.claims += [claim for one in evidence for claim in one.claims]
     report.stalls = [stall for one in evidence for stall in one.stalls]
@@ -145,7 +146,7 @@ def pytest_runtest_makereport(item, call):
 
 
 class Listener:
-    """Keeps the reports, to be sent."""
+    """Collects the reports of one attempt."""
 
     def __init__(self):
         self.reports = []
@@ -155,9 +156,9 @@ class Listener:
 
 
 def perform(config, items):
-    """Runs what is one attempt; what it reports."""
+    """Runs one attempt and returns its reports."""
     capture, listener, begin_us = config.pluginmanager.getplugin("capturemanager"), Listener(), verdict.now_us()
-    capture.stop_global_capturing()  # It is shared with attempts beside this one.
+    capture.stop_global_capturing()  # Parallel attempts share the old one.
     capture.start_global_capturing()
     capture.suspend_global_capture()
     config.pluginmanager.register(listener)
@@ -182,14 +183,14 @@ def limit_of(items):
 
 
 def apart(function, limit_s):
-    """What the function returns, in a process and session of its own, all of which is killed afterwards; or the words of how it died."""
+    """Runs the function in a separate process and session, and kills that session afterwards. Returns the result, or a text on how the process ended."""
     ours, theirs = multiprocessing.Pipe(duplex=False)
     child = os.fork()
     if child == 0:
         try:
             os.setsid()
             verdict.die_with_parent()
-            signal.signal(signal.SIGINT, signal.default_int_handler)  # A shell's background job ignores it, and so would the tests' programs.
+            signal.signal(signal.SIGINT, signal.default_int_handler)  # A background job of a shell ignores SIGINT, and so would the tests' programs.
             theirs.send(function())
         finally:
             os._exit(1)
@@ -198,7 +199,7 @@ def apart(function, limit_s):
     with contextlib.suppress(EOFError):
         answer = None if late else ours.recv()
     if late:
-        os.kill(child, signal.SIGABRT)  # Python then writes where it was.
+        os.kill(child, signal.SIGABRT)  # Python then prints its current line.
         ours.poll(1)
     with contextlib.suppress(ProcessLookupError):
         os.killpg(child, signal.SIGKILL)
@@ -208,7 +209,7 @@ def apart(function, limit_s):
 
 
 class Nursery:
-    """Processes, as many as there may be attempts at a time, that fork each attempt."""
+    """One process per parallel attempt, which forks each attempt."""
 
     def __init__(self, config, units):
         self.free, self.children = queue.SimpleQueue(), []
@@ -233,7 +234,7 @@ class Nursery:
             line.send(apart(lambda: perform(config, items), limit_of(items)))
 
     def ask(self, name):
-        """The answer of one attempt, from one of several threads."""
+        """The result of one attempt. Several threads may call it."""
         line = self.free.get()
         try:
             line.send(name)
@@ -242,7 +243,7 @@ class Nursery:
             self.free.put(line)
 
     def close(self):
-        """Attempts that still run die with them."""
+        """Kills the processes; attempts that still run end with them."""
         while self.children:
             child = self.children.pop()
             os.kill(child, signal.SIGKILL)
@@ -253,7 +254,7 @@ class Nursery:
 
 
 def units_of(items):
-    """{name: the tests that are one attempt}"""
+    """{name: the tests of one attempt}"""
     units = {}
     for item in items:
         shared = item.cls and "setUpClass" in vars(item.cls)
@@ -270,14 +271,14 @@ class Run(verdict.Session):
         self.config, self.units, self.lock = session.config, units_of(session.items), threading.Lock()
         self.over, self.skipped, self.passed = False, {}, {}
         self.folder = tempfile.mkdtemp(prefix="iwheel-tests-")
-        os.chmod(self.folder, 0o1777)  # As /tmp: what tests do as another user ends at their own folders.
+        os.chmod(self.folder, 0o1777)  # As /tmp: tests that run as another user can write only into their own folders.
         tempfile.tempdir = os.environ["TMPDIR"] = self.folder
         virtual = self.config.option.virtual
         self.nursery = (self.config.pluginmanager.getplugin("pytest_virtual").Boots if virtual else Nursery)(self.config, self.units)
-        super().__init__(self.work_off, self.tell, None if virtual else verdict.Witness(getattr(self.config, "witness_nice", 0)))
+        super().__init__(self.work_off, self.forward, None if virtual else verdict.Witness(getattr(self.config, "witness_nice", 0)))
 
     def stalls(self, begin_us, end_us):
-        """None in virtual time."""
+        """There are no stalls in virtual time."""
         return super().stalls(begin_us, end_us) if self.witness else []
 
     def close(self):
@@ -294,7 +295,7 @@ class Run(verdict.Session):
         raise KeyboardInterrupt
 
     def work_off(self, name):
-        """One attempt of these tests."""
+        """Makes one attempt of these tests."""
         answer, items = self.nursery.ask(name), self.units[name]
         if isinstance(answer, verdict.Attempt):
             return answer
@@ -309,8 +310,8 @@ class Run(verdict.Session):
         failures = [verdict.Failure(*failure) for failure in failures]
         return verdict.Attempt(failures, claims=claims, stalls=stalls, tests=tests, skips=len(skips), data=reports, **answer)
 
-    def tell(self, name, kind, attempt, tries):
-        """The reports of the last attempt go to pytest's other plugins, with what was decided."""
+    def forward(self, name, kind, attempt, tries):
+        """Passes the reports of the last attempt to pytest's other plugins, with the verdict."""
         with self.lock:
             if self.over:
                 return
@@ -323,20 +324,20 @@ class Run(verdict.Session):
                     self.skipped[report.nodeid] = f"skip: {report.nodeid}: {report.longrepr[2].removeprefix('Skipped: ')}"
                 more = [f"attempt {tries}, alone"] if tries > 1 else []
                 more += [f"longest stall {self.stall_ms(attempt):.0f} ms"] if report.failed else []
-                report.told = ", ".join([f"{report.duration:.1f} s", *(getattr(report, "figures", [])), *more])
+                report.summary = ", ".join([f"{report.duration:.1f} s", *(getattr(report, "figures", [])), *more])
                 if report.when == "setup":
                     self.config.hook.pytest_runtest_logstart(nodeid=report.nodeid, location=report.location)
                 self.config.hook.pytest_runtest_logreport(report=report)
 
     def add(self, name, attempt, figures):
-        """The verdict on something that is no test."""
+        """Adds a verdict on something that is not a test."""
         report = report_of(name, (name, 0, name), attempt)
         report.figures = figures
         self.take(name, self.verdict_of(attempt), attempt._replace(data=[report]))
 
 
 def attempts_inside(session):
-    """All of a plan of pytest_virtual.py, each told as it ends."""
+    """Makes all attempts of a plan of pytest_virtual.py and writes each result when the attempt ends."""
     config, units = session.config, units_of(session.items)
     config.pluginmanager.unregister(name="terminalreporter")
     with open(config.option.inside, encoding="utf-8") as file:
@@ -349,24 +350,24 @@ def attempts_inside(session):
 
 
 def report_of(nodeid, location, attempt):
-    """Of what has no report of pytest's: no test, or one whose process told nothing."""
+    """A report for an attempt without one of pytest: no test, or a process that sent none."""
     text = "\n".join(failure.text for failure in attempt.failures)
-    outcome, told = ("failed", text) if text else ("skipped", (*location[:2], attempt.skip)) if attempt.skip else ("passed", None)
-    return pytest.TestReport(nodeid, location, {}, outcome, told, "call")
+    outcome, longrepr = ("failed", text) if text else ("skipped", (*location[:2], attempt.skip)) if attempt.skip else ("passed", None)
+    return pytest.TestReport(nodeid, location, {}, outcome, longrepr, "call")
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_report_teststatus(report):
-    """With -v: how long it took, what it measured, and which attempt it was."""
-    if report.when == "call" and report.outcome in ("passed", "failed") and hasattr(report, "told") and not hasattr(report, "context"):  # No subtest.
-        return report.outcome, ".F"[report.failed], f"{report.outcome.upper()} ({report.told})"
+    """With -v: the duration, the measurements and the number of the attempt."""
+    if report.when == "call" and report.outcome in ("passed", "failed") and hasattr(report, "summary") and not hasattr(report, "context"):  # No subtest.
+        return report.outcome, ".F"[report.failed], f"{report.outcome.upper()} ({report.summary})"
     return None
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtestloop(session):
     option = session.config.option
-    if option.collectonly or option.usepdb or session.testsfailed:  # Failed before any test: a file cannot be read.
+    if option.collectonly or option.usepdb or session.testsfailed:  # A failure before any test: a file cannot be imported.
         return None
     if option.inside:
         return attempts_inside(session)
@@ -374,7 +375,7 @@ def pytest_runtestloop(session):
     try:
         for number in (signal.SIGINT, signal.SIGTERM):
             handlers[number] = signal.signal(number, run.interrupt)
-        run.run(list(run.units), len(run.units) if option.virtual else option.jobs)  # Kernels take what is theirs.
+        run.run(list(run.units), len(run.units) if option.virtual else option.jobs)  # Each kernel gets its share.
         session.config.hook.pytest_verdict_end(run=run)
         session.config.stash[RUN] = run
     finally:

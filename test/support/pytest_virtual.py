@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""pytest --virtual: the tests run inside the kernel of test/kernel, where waiting takes no time, and no load of the machine makes anybody late.
+"""pytest --virtual: the tests run inside the kernel of test/kernel, where waiting takes no time and no load of the machine delays a program.
 
-Outside, `Boots` takes the place of pytest_verdict.py's Nursery: as many kernels as --jobs, each with its share of the attempts. Inside, guest_pytest.py
-makes them one by one and tells what came of each. No failure is excused there, so each attempt is conclusive.
+Outside, `Boots` replaces the Nursery of pytest_verdict.py: as many kernels as --jobs, each with its share of the attempts. Inside, guest_pytest.py
+makes the attempts one by one and reports each result. No failure is excused there, so each attempt is conclusive.
 
-@pytest.mark.native("reason"): what no virtual time can show, a race, a flood, the cost of something; --virtual skips it, by name.
-@pytest.mark.pace(N): in virtual time telemetry comes N times slower than documented; without the mark 4 times (test/kernel/catalogue.py says why).
+@pytest.mark.native("reason"): virtual time cannot show this, for example a race, a flood or a duration; --virtual skips it, by name.
+@pytest.mark.pace(N): in virtual time telemetry comes N times slower than documented; 4 times without the mark (test/kernel/catalogue.py explains why).
 """
 
 import os
@@ -23,14 +23,14 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 KERNEL = ROOT / "test/kernel"
 GUEST = Path(__file__).resolve().parent / "guest_pytest.py"
 PACE = 4
-LIMIT_S = 1800  # of one kernel, by the host's clock
+LIMIT_S = 1800  # limit of one kernel, by the host's clock
 POLL_S = 0.1
 MEMORY_MB = 512
 
 
 def pytest_configure(config):
-    config.addinivalue_line("markers", "native(reason): what cannot be shown in virtual time")
-    config.addinivalue_line("markers", f"pace(times): in virtual time telemetry is so many times slower; {PACE} without this mark")
+    config.addinivalue_line("markers", "native(reason): the test cannot run in virtual time")
+    config.addinivalue_line("markers", f"pace(times): in virtual time telemetry is this many times slower; default {PACE}")
 
 
 def pytest_runtest_setup(item):
@@ -40,7 +40,7 @@ def pytest_runtest_setup(item):
 
 
 class Boots:
-    """The kernels. `ask` answers like Nursery's; `reason` is why there is none."""
+    """The kernels. `ask` has the interface of Nursery's; `reason` says why there is no kernel, if so."""
 
     def __init__(self, config, units):
         sys.path.append(str(KERNEL))
@@ -78,7 +78,7 @@ class Boots:
         }
 
     def watch(self, boot, names):
-        """Hands on what the kernel tells, until it ends; what it did not get to has failed."""
+        """Passes the results of the kernel on until it ends; tests without a result have failed."""
         left = dict.fromkeys(names)
         while True:
             running = boot.running() and boot.seconds() < LIMIT_S
@@ -105,13 +105,13 @@ class Boots:
 
 
 def native_only(items):
-    """{item: reason} of those that say so."""
+    """{item: reason} of the tests marked native."""
     marks = {item: item.get_closest_marker("native") for item in items}
     return {item: mark.args[0] for item, mark in marks.items() if mark}
 
 
 def pytest_collection_modifyitems(config, items):
-    """Those are for another run, without --virtual."""
+    """Native tests belong to another run, without --virtual."""
     if config.option.virtual:
         native = native_only(items)
         config.hook.pytest_deselected(items=list(native))

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Fixtures for tests of programs as they are. Functions with @scenario are tests too: each gets `t`, which makes rigs of `rig_type` (the folder's) and
-collects what it finds."""
+"""Fixtures for tests of whole programs. Functions with @scenario are tests too: each receives `t`, which makes rigs of `rig_type` (the folder's) and
+collects the findings."""
 
 import pytest
 import scenario
@@ -27,7 +27,7 @@ def t(build, rig_type, pytestconfig):
 
 @pytest.fixture
 def make_rig(build, request, pytestconfig):
-    """Makes the one rig of a bridge's test, with what @pytest.mark.rig(...) says."""
+    """Makes the one rig of a bridge's test, with the arguments of @pytest.mark.rig(...)."""
     made = []
 
     def make(rig_type):
@@ -41,16 +41,16 @@ def make_rig(build, request, pytestconfig):
 
 
 def pytest_configure(config):
-    config.addinivalue_line("markers", "rig(...): what the test's rig is made with")
+    config.addinivalue_line("markers", "rig(...): arguments of the test's rig")
 
 
 def pytest_pycollect_makeitem(collector, name, obj):
-    """Scenarios, of any name."""
+    """Collects scenarios of any name."""
     if hasattr(obj, "scenario") and callable(obj):
         return list(collector._genfunctions(name, obj))
     return None
 
 
 def pytest_collection_modifyitems(items):
-    """The longest begin first."""
+    """The longest tests begin first."""
     items.sort(key=lambda item: -getattr(getattr(item, "obj", None), "scenario", ("", 0))[1])

@@ -13,7 +13,7 @@ void setpoint_rig_begin(setpoint_rig_t *self) {
 
 void setpoint_rig_init(setpoint_rig_t *self) {
     fixture_config(&self->config);
-    // So wide that no ramp meets them: unit_yaw judges the limits of yaw.
+    // These limits are too wide for any ramp to reach: unit_yaw judges the limits of yaw.
     self->config.max_yaw_mrad_s = 10000;
     self->config.yaw_accel_mrad_s2 = 10000;
     self->config.track_mm = 1500;
@@ -32,7 +32,7 @@ void setpoint_rig_demand(setpoint_rig_t *self, iw_demand_t demand) {
 
 iw_pair_t setpoint_rig_take_next(setpoint_rig_t *self) {
     const iw_time_us_t next_us = iw_setpoint_next_us(&self->setpoint);
-    TEST_ASSERT_TRUE_MESSAGE(next_us != IW_NEVER, "nothing will ever be due");
+    TEST_ASSERT_TRUE_MESSAGE(next_us != IW_NEVER, "no pair will ever be due");
     return setpoint_rig_take_after(self, (next_us > self->now_us) ? next_us - self->now_us : 0);
 }
 

@@ -12,31 +12,31 @@ typedef struct {
     iw_time_us_t now_us;
 } setpoint_rig_t;
 
-/// In silence, with the configuration of the fixture, but limits of yaw that no ramp meets.
+/// Begins in silence, with the configuration of the fixture and limits of yaw that no ramp reaches.
 void setpoint_rig_init(setpoint_rig_t *self);
 
-/// Anew, with the configuration that is there.
+/// Begins again with the rig's configuration.
 void setpoint_rig_begin(setpoint_rig_t *self);
 
 /// Commands both speeds now, with the same current for both wheels.
 void setpoint_rig_command(setpoint_rig_t *self, int16_t left_mm_s, int16_t right_mm_s, int16_t current_mA);
 
-/// Tells what to aim at now.
+/// Sets the demand now.
 void setpoint_rig_demand(setpoint_rig_t *self, iw_demand_t demand);
 
-/// Goes to when the next pair is due and takes it.
+/// Advances to the time when the next pair is due and returns the pair.
 iw_pair_t setpoint_rig_take_next(setpoint_rig_t *self);
 
-/// Lets time pass and takes the pair that must be due then.
+/// Lets time pass and returns the pair that must be due then.
 iw_pair_t setpoint_rig_take_after(setpoint_rig_t *self, iw_time_us_t for_us);
 
-/// From silence to FOLLOW, with the first pair taken.
+/// Goes from silence to FOLLOW and reads the first pair.
 void setpoint_rig_follow(setpoint_rig_t *self);
 
-/// From silence to that speed since a long time.
+/// Goes from silence to a speed that has been constant for a long time.
 void setpoint_rig_cruise(setpoint_rig_t *self, int16_t left_mm_s, int16_t right_mm_s, int16_t current_mA);
 
-/// The pair last taken is zero.
+/// Returns true if the last pair is zero.
 bool setpoint_rig_is_zero(const setpoint_rig_t *self);
 
 #endif

@@ -9,7 +9,7 @@ static int32_t either_way(sim_random_t *random, int32_t most) {
     return (int32_t)sim_random_below(random, 2U * (uint32_t)most + 1U) - most;
 }
 
-/// An end of a range as often as anything between: what is worst lies at the ends.
+/// Chooses an end of a range as often as a value inside: the worst cases are at the ends.
 static uint32_t anywhere(sim_random_t *random, uint32_t low, uint32_t high) {
     uint32_t const kind = sim_random_below(random, 4U);
     if (kind < 2U) {
@@ -30,7 +30,7 @@ void sim_ranges_machine(sim_pair_config_t *config, sim_random_t *random) {
     }
 }
 
-/// Told of both wheels in the machine's own direction.
+/// Slope of both wheels in the machine's own direction.
 static void set_slope(sim_pair_t *pair, iw_time_us_t now_us, int32_t slope_mm_s2) {
     for (unsigned side = 0U; side < IW_SIDES; side++) {
         sim_motion_t *const motion = &pair->wheel[side].motion;

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""The rules of verdict.py as pytest_verdict.py keeps them: pytest runs made-up tests on a machine whose stalls are made up. And each fault that is seeded
-into the plugin fails the test that is named beside it.
+"""Tests the rules of verdict.py in pytest_verdict.py: pytest runs invented tests on a machine with invented stalls. Each fault that is seeded into the
+plugin must fail the test that is named in its row.
 
 usage: test/support/test_pytest_verdict.py [unittest's arguments]
 
@@ -23,7 +23,7 @@ from typing import NamedTuple
 
 HERE = Path(__file__).resolve().parent
 SOURCES = (HERE / "pytest_verdict.py", HERE / "pytest_virtual.py")
-# (what, old, new, the test that must fail)
+# (fault, old, new, the test that must fail)
 FAULTS = (
     ("a collected failure is forgotten", "    if found:\n        more", "    if False:\n        more", "test_collected_rule_is_final"),
     (
@@ -33,23 +33,23 @@ FAULTS = (
         "test_crash_behind_a_collected_failure_is_final",
     ),
     ("a skip hides what was found before it", "except (Exception, pytest.skip.Exception,", "except (AssertionError,", "test_skip_hides_no_failure"),
-    ("the kind of a failure is lost", 'getattr(error, "failures", told.failures)', "told.failures", "test_collected_rule_is_final"),
-    ("what a program printed is not judged", "(said for _, said in report.sections)", "()", "test_sanitizer_report_is_final"),
-    ("what a fixture's programs said is not judged", 'report.failed and hasattr(one, "said")]', "False]", "test_words_of_a_fixture_are_judged"),
+    ("the kind of a failure is lost", 'getattr(error, "failures", judged.failures)', "judged.failures", "test_collected_rule_is_final"),
+    ("the output of a program is not judged", "(said for _, said in report.sections)", "()", "test_sanitizer_report_is_final"),
+    ("the output of a fixture's programs is not judged", 'report.failed and hasattr(one, "said")]', "False]", "test_words_of_a_fixture_are_judged"),
     ("a fixture that is a type hides the failure", "if not isinstance(one, type)]", "]", "test_fixture_that_is_a_type_hides_no_failure"),
     ("stalls that the test measured are lost", "for stall in one.stalls]", "for stall in ()]", "test_stall_that_the_test_measured_counts"),
-    ("the gateway's own word is lost", "told.failures), told.claims", "told.failures), []", "test_gateway_late_next_to_a_late_machine_is_repeated"),
+    ("the gateway's own report is lost", "judged.failures), judged.claims", "judged.failures), []", "test_gateway_late_next_to_a_late_machine_is_repeated"),
     (
-        "the gateway's own word is enough",
+        "the gateway's own report is enough",
         "claims=claims, stalls=stalls,",
         "claims=[], stalls=stalls + claims,",
         "test_gateway_late_on_a_quiet_machine_is_final",
     ),
-    ("a crash is a matter of time", "[verdict.Failure(answer, verdict.CRASH)]", "[verdict.Failure(answer)]", "test_crash_is_final"),
+    ("a crash counts as late", "[verdict.Failure(answer, verdict.CRASH)]", "[verdict.Failure(answer)]", "test_crash_is_final"),
     ("a crash passes", "return verdict.Attempt([verdict.Failure(answer, verdict.CRASH)])", "return verdict.Attempt()", "test_crash_is_final"),
-    ("no end in time", "not ours.poll(limit_s)", "not ours.poll(None)", "test_hang_is_final"),
-    ("what a test leaves behind lives on", "os.killpg(child, signal.SIGKILL)", "os.kill(child, signal.SIGKILL)", "test_nothing_is_left_behind"),
-    ("other users are kept from the tests", "os.chmod(self.folder, 0o1777)", "pass", "test_other_users_may_enter_the_folder_of_all_tests"),
+    ("no time limit", "not ours.poll(limit_s)", "not ours.poll(None)", "test_hang_is_final"),
+    ("remaining processes of a test live on", "os.killpg(child, signal.SIGKILL)", "os.kill(child, signal.SIGKILL)", "test_nothing_is_left_behind"),
+    ("other users cannot enter the folder of the tests", "os.chmod(self.folder, 0o1777)", "pass", "test_other_users_may_enter_the_folder_of_all_tests"),
     (
         "attempts share their output",
         "    capture.stop_global_capturing()",
@@ -68,23 +68,23 @@ FAULTS = (
         "shared = False",
         "test_class_that_prepares_once_is_one_attempt",
     ),
-    ("tests that are together run apart", "if mark else item.parent.nodeid", "if False else item.parent.nodeid", "test_tests_together_are_one_attempt"),
-    ("a stall explains what is exact", 'if items[0].get_closest_marker("exact"):', "if False:", "test_exact_test_is_final"),
-    ("a test counts as one, whatever it says", '.get("tests", 1)', '.get("test", 1)', "test_what_a_test_counts_as"),
+    ("tests of one group run separately", "if mark else item.parent.nodeid", "if False else item.parent.nodeid", "test_tests_together_are_one_attempt"),
+    ("a stall excuses an exact test", 'if items[0].get_closest_marker("exact"):', "if False:", "test_exact_test_is_final"),
+    ("a test always counts as one", '.get("tests", 1)', '.get("test", 1)', "test_number_of_tests_of_a_test_counts"),
     ("skipped tests of a class pass", "skips=len(skips)", "skips=0", "test_class_that_prepares_once_is_one_attempt"),
     (
-        "others hear of each attempt",
+        "other plugins receive each attempt",
         'report.outcome, report.longrepr = "skipped"',
-        'report.told, report.longrepr = "skipped"',
+        'report.summary, report.longrepr = "skipped"',
         "test_late_on_a_late_machine_is_not_judged",
     ),
     ("pytest's own status wins", "session.exitstatus = MISSING if", "_ = MISSING if", "test_late_on_a_late_machine_is_not_judged"),
-    ("what was skipped has no name", "print(*kept, *run.skipped.values(),", "print(*kept,", "test_late_on_a_late_machine_is_not_judged"),
+    ("a skipped test has no name", "print(*kept, *run.skipped.values(),", "print(*kept,", "test_late_on_a_late_machine_is_not_judged"),
     ("all tests run although some cannot be read", "or session.testsfailed", "", "test_broken_file_is_no_success"),
     ("the long tests always run", 'if os.environ.get("IWHEEL_FULL") != "1" and', "if False and", "test_long_tests"),
     ("the long tests never run", 'os.environ.get("IWHEEL_FULL") != "1"', "True", "test_long_tests"),
-    ("what a folder concludes is not counted", "session.config.hook.pytest_verdict_end(run=run)", "pass", "test_what_a_folder_concludes_counts"),
-    ("what a folder wants to know is lost", "for key, value in one.data.items()}", "for key, value in ()}", "test_what_a_folder_concludes_counts"),
+    ("the verdict of a folder is not counted", "session.config.hook.pytest_verdict_end(run=run)", "pass", "test_verdict_of_a_folder_counts"),
+    ("the data for a folder's verdict is lost", "for key, value in one.data.items()}", "for key, value in ()}", "test_verdict_of_a_folder_counts"),
     (
         "virtual time is real",
         '(self.config.pluginmanager.getplugin("pytest_virtual").Boots if virtual else Nursery)',
@@ -92,17 +92,17 @@ FAULTS = (
         "test_each_test_of_each_share_is_judged_once_inside",
     ),
     (
-        "what a kernel did not get to passes",
+        "a test that its kernel did not run passes",
         'self.answers[name].put(f"{why}\\n{boot.complaint()}")',
         "self.answers[name].put(verdict.Attempt())",
-        "test_kernel_that_ends_early_fails_what_is_left",
+        "test_kernel_that_ends_early_fails_the_remaining_tests",
     ),
-    ("without a kernel all is well", "MISSING if", "0 if", "test_without_a_kernel_nothing_is_judged"),
+    ("tests without a kernel pass", "MISSING if", "0 if", "test_without_a_kernel_nothing_is_judged"),
     (
         "what is for real time runs in virtual time",
         "items[:] = [item for item in items if item not in native]",
         "pass",
-        "test_what_needs_real_time_is_left_out_of_virtual_time",
+        "test_native_test_is_left_out_of_virtual_time",
     ),
     ("the sample is always the same", 'f"{key} {item.nodeid}"', "item.nodeid", "test_sample_is_of_the_commit"),
     ("an interrupted run goes on", "        self.over = True\n        self.nursery.close()\n", "", "test_interrupted_run_ends_with_its_tests"),
@@ -128,7 +128,7 @@ HEAD = """
 
 
 def runs(pid):
-    """And has not only nobody who waits for it."""
+    """True if the process exists and is not only waiting for its parent (a zombie)."""
     path = Path(f"/proc/{pid}/cmdline")
     return path.exists() and bool(path.read_bytes())
 
@@ -136,8 +136,8 @@ def runs(pid):
 class Ran(NamedTuple):
     status: int
     lines: list
-    notes: list  # What the tests have noted, in that order.
-    cases: dict  # {name: passed, failed, error or skipped} of JUnit's file.
+    notes: list  # The notes of the tests, in order.
+    cases: dict  # {name: passed, failed, error or skipped} from JUnit's file.
 
     @property
     def last(self):
@@ -145,7 +145,7 @@ class Ran(NamedTuple):
 
 
 class Made(unittest.TestCase):
-    """Each test writes a file of tests."""
+    """Each test writes a file of tests and runs it."""
 
     plugin = HERE
 
@@ -194,7 +194,7 @@ class Made(unittest.TestCase):
         return Ran(done.returncode, done.stdout.splitlines(), notes.read_text().split() if notes.exists() else [], cases)
 
     def final(self, tests, *options, junit="failure", **how):
-        """One attempt, and it fails."""
+        """Asserts one attempt, which fails."""
         ran = self.run_made(tests, *options, **how)
         self.assertEqual(
             (1, "0 passed, 1 failed, 0 skipped", ["tried"], {"test_one": junit}), (ran.status, ran.last, ran.notes, ran.cases), "\n".join(ran.lines)
@@ -202,7 +202,7 @@ class Made(unittest.TestCase):
         return "\n".join(ran.lines)
 
     def repeated(self, tests, **how):
-        """Four attempts, and it is not judged."""
+        """Asserts four attempts and no verdict."""
         ran = self.run_made(tests, **how)
         self.assertEqual(
             (75, "0 passed, 0 failed, 1 skipped", ["tried"] * 4, {"test_one": "skipped"}), (ran.status, ran.last, ran.notes, ran.cases), "\n".join(ran.lines)
@@ -220,7 +220,7 @@ class Conclusive(Made):
     def test_collected_rule_is_final(self):
         self.assertIn("rule: moved", self.final('def test_one(t):\n    note("tried")\n    t.failures.append(verdict.Failure("moved", verdict.RULE))\n'))
 
-    def test_rule_beside_an_explained_failure_is_final(self):
+    def test_rule_next_to_an_explained_failure_is_final(self):
         self.final("""
             def test_one(t):
                 note("tried")
@@ -247,7 +247,7 @@ class Conclusive(Made):
         self.final('def test_one():\n    note("tried")\n    os.system("echo ==1==ERROR: AddressSanitizer: heap-use-after-free >&2")\n    assert False\n')
 
     def test_words_of_a_fixture_are_judged(self):
-        said = self.final("""
+        output = self.final("""
             class Rig:
                 def said(self):
                     return "iwheel-gateway: Segmentation fault"
@@ -260,10 +260,10 @@ class Conclusive(Made):
                 note("tried")
                 assert False
             """)
-        self.assertIn("Segmentation fault", said)
+        self.assertIn("Segmentation fault", output)
 
     def test_fixture_that_is_a_type_hides_no_failure(self):
-        said = self.final("""
+        output = self.final("""
             class Rig:
                 def said(self):
                     return "nothing"
@@ -276,18 +276,18 @@ class Conclusive(Made):
                 note("tried")
                 assert False, "Segmentation fault, the reason"
             """)
-        self.assertIn("the reason", said)
+        self.assertIn("the reason", output)
 
     def test_crash_is_final(self):
         for crash in ("os.abort()", "os._exit(0)", "os.kill(os.getpid(), 9)"):
             self.final(f'def test_one():\n    note("tried")\n    {crash}\n')
 
     def test_hang_is_final(self):
-        said = self.final('@pytest.mark.limit(1)\ndef test_one():\n    note("tried")\n    time.sleep(20)\n')
-        self.assertIn("did not end within 1 s", said)
-        self.assertIn("in test_one", said, "Python says where it was")
+        output = self.final('@pytest.mark.limit(1)\ndef test_one():\n    note("tried")\n    time.sleep(20)\n')
+        self.assertIn("did not end within 1 s", output)
+        self.assertIn("in test_one", output, "Python reports the function")
 
-    def test_end_of_what_forks_the_attempts_is_final(self):
+    def test_end_of_the_forking_process_is_final(self):
         self.final('def test_one():\n    note("tried")\n    os.kill(os.getppid(), 9)\n    time.sleep(20)\n')
 
     def test_check_on_a_quiet_machine_is_final(self):
@@ -297,7 +297,7 @@ class Conclusive(Made):
         self.final('def test_one():\n    note("tried")\n    assert False, "the gateway itself was held up for 583 ms"\n', stalls="[]")
 
     def test_one_of_several_parts_is_final(self):
-        """Also if another part is only late."""
+        """A final failure counts even if another part is only late."""
         self.final("""
             class Test(unittest.TestCase):
                 def test_one(self):
@@ -439,7 +439,7 @@ class Processes(Made):
         )
         self.assertEqual((0, "4 passed, 0 failed, 0 skipped"), (ran.status, ran.last), ran.lines)
 
-    def test_what_a_test_counts_as(self):
+    def test_number_of_tests_of_a_test_counts(self):
         ran = self.run_made('def test_one(record_property):\n    record_property("tests", 7)\n')
         self.assertEqual((0, "7 passed, 0 failed, 0 skipped"), (ran.status, ran.last), ran.lines)
 
@@ -490,11 +490,11 @@ class Processes(Made):
         self.assertEqual((0, "2 passed, 0 failed, 1 skipped", ["prepared"]), (ran.status, ran.last, ran.notes), ran.lines)
         self.assertIn("skip: test_it.py::Test::test_three: no port", ran.lines)
 
-    def test_what_was_measured_is_told(self):
+    def test_measurements_are_printed(self):
         ran = self.run_made('def test_one(t):\n    t.figures.append("7 ms")\n')
         self.assertRegex("\n".join(ran.lines), r"test_one PASSED \(0\.\d s, 7 ms\)")
 
-    def test_what_a_folder_concludes_counts(self):
+    def test_verdict_of_a_folder_counts(self):
         conftest = """
             def pytest_verdict_end(run):
                 values = [value for attempt in run.passed.values() for report in attempt.data if report.when == "call" for value in report.data["values"]]
@@ -529,13 +529,13 @@ class Processes(Made):
                 time.sleep(0.05)
             process.send_signal(number)
             try:
-                said, _ = process.communicate(timeout=10)
+                output, _ = process.communicate(timeout=10)
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.communicate()
                 self.fail("it goes on")
             self.assertNotEqual(0, process.returncode)
-            self.assertNotRegex(said, r"passed, \d+ failed")
+            self.assertNotRegex(output, r"passed, \d+ failed")
             self.assertEqual([], [path.name for path in self.folder.glob("iwheel-*")])
             time.sleep(0.2)
             self.assertEqual([], [pid for pid in notes.read_text().split() if runs(pid)])
@@ -580,7 +580,7 @@ class Chosen(Made):
 
 
 class Virtual(Made):
-    """The kernel is a process that does at once what the plan says."""
+    """The kernel is a process that immediately carries out the plan."""
 
     BOOT = """
         import sys
@@ -597,38 +597,38 @@ class Virtual(Made):
     def virtual(self, tests, *options, kernel="return 'none'", more=""):
         return self.run_made(tests, "--virtual", *options, conftest=textwrap.dedent(self.BOOT).format(here=str(HERE), kernel=kernel) + more)
 
-    def told(self, ran):
+    def results(self, ran):
         return ran.status, ran.last, ran.notes
 
     def test_each_test_of_each_share_is_judged_once_inside(self):
         where = 'note("inside" if request.config.option.inside else "outside")'
         ran = self.virtual(f"def test_one(request):\n    {where}\n\ndef test_two(request):\n    {where}\n", "--jobs", "2")
-        self.assertEqual((0, "2 passed, 0 failed, 0 skipped", ["inside"] * 2), self.told(ran), ran.lines)
+        self.assertEqual((0, "2 passed, 0 failed, 0 skipped", ["inside"] * 2), self.results(ran), ran.lines)
         self.assertEqual({"test_one": "passed", "test_two": "passed"}, ran.cases)
 
     def test_nothing_is_excused_in_virtual_time(self):
         ran = self.virtual(self.TWO.format('assert False, "not within 1 s"'), "--jobs", "1")
-        self.assertEqual((1, "1 passed, 1 failed, 0 skipped", ["tried"]), self.told(ran), ran.lines)
+        self.assertEqual((1, "1 passed, 1 failed, 0 skipped", ["tried"]), self.results(ran), ran.lines)
         self.assertIn("not within 1 s", "\n".join(ran.lines))
 
-    def test_kernel_that_ends_early_fails_what_is_left(self):
+    def test_kernel_that_ends_early_fails_the_remaining_tests(self):
         ran = self.virtual(self.TWO.format("os.kill(os.getppid(), 9)"), "--jobs", "1")
-        self.assertEqual((1, "0 passed, 2 failed, 0 skipped", ["tried"]), self.told(ran), ran.lines)
+        self.assertEqual((1, "0 passed, 2 failed, 0 skipped", ["tried"]), self.results(ran), ran.lines)
         self.assertIn("its kernel ended before it did", "\n".join(ran.lines))
 
     def test_without_a_kernel_nothing_is_judged(self):
         ran = self.virtual(self.TWO.format("pass"), kernel="raise RuntimeError('no flex')")
-        self.assertEqual((77, "0 passed, 0 failed, 2 skipped", []), self.told(ran), ran.lines)
+        self.assertEqual((77, "0 passed, 0 failed, 2 skipped", []), self.results(ran), ran.lines)
         self.assertIn("skip: test_it.py::test_two: no virtual time: no flex", ran.lines)
 
-    def test_what_needs_real_time_is_left_out_of_virtual_time(self):
+    def test_native_test_is_left_out_of_virtual_time(self):
         tests = '@pytest.mark.native("a race")\n' + self.TWO.format("pass")
-        self.assertEqual((0, "1 passed, 0 failed, 0 skipped", []), self.told(self.virtual(tests)))
+        self.assertEqual((0, "1 passed, 0 failed, 0 skipped", []), self.results(self.virtual(tests)))
         self.assertEqual(["tried"], self.run_made(tests).notes)
 
 
 def seed(old, new, noticer):
-    """Whether the test fails with this fault in the plugin; None: the plugin has no such code."""
+    """Whether the test fails with this fault in the plugin; None if the plugin does not have this code exactly once."""
     texts = {source: source.read_text(encoding="utf-8") for source in SOURCES}
     found = [source for source, text in texts.items() for _ in range(text.count(old))]
     if len(found) != 1:
@@ -657,7 +657,7 @@ def main():
         noticed = seed(old, new, noticer)
         print(
             f"{'ok  ' if noticed else 'FAIL'} seeded fault: {what}: {noticer}"
-            + (" does not notice it" if noticed is False else "; its text is not there once" if noticed is None else ""),
+            + (" does not notice it" if noticed is False else "; its code does not occur exactly once" if noticed is None else ""),
             flush=True,
         )
         passed, failed = passed + bool(noticed), failed + (not noticed)

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""The verdicts of test/support/verdict.py, by a fake runner whose attempts and stalls are made up; and that each fault seeded into the module is seen.
+"""Tests the verdicts of test/support/verdict.py with a fake runner whose attempts and stalls are invented, and tests that each seeded fault is noticed.
 
 usage: test/support/test_verdict.py [unittest's arguments]
 
@@ -28,7 +28,7 @@ sys.dont_write_bytecode = True
 import verdict
 
 AT_US = 3_000_000
-# What the module must decide is tried on copies of it, each with one of these faults: (what, old, new). Each must fail a test below.
+# The decisions of the module are tested on copies of it, each with one of these faults: (fault, old, new). Each fault must fail a test below.
 FAULTS = (
     ("a broken rule is excused by a stall", "if failure.kind not in (TIMING, CHECK)", "if failure.kind not in (TIMING, CHECK, RULE)"),
     ("a crash is excused by a stall", "if failure.kind not in (TIMING, CHECK)", "if failure.kind not in (TIMING, CHECK, CRASH)"),
@@ -39,8 +39,8 @@ FAULTS = (
     ("a stall explains what happened long after it", "BEFORE_US, AFTER_US = 400_000", "BEFORE_US, AFTER_US = 40_000_000"),
     ("stalls of other tests count", "if begin_us <= at_us and at_us - late_us <= end_us", "if at_us"),
     ("one stall seen on two processors counts twice", "if spans and begin_us <= spans[-1][1]:", "if False:"),
-    ("the gateway's own word is enough", "claims=[(now_us()", "stalls=[(now_us()"),
-    ("the gateway's own word is ignored", "[*stalls, *claims]", "stalls"),
+    ("the gateway's own report is enough", "claims=[(now_us()", "stalls=[(now_us()"),
+    ("the gateway's own report is ignored", "[*stalls, *claims]", "stalls"),
     ("a conclusive failure is repeated", "if verdict == INCONCLUSIVE:\n                undecided", "if verdict != PASSED:\n                undecided"),
     ("the last attempt counts as passed", "self.counts[SKIPPED if verdict == INCONCLUSIVE", "self.counts[PASSED if verdict == INCONCLUSIVE"),
     ("repeated until it passes", "if verdict != INCONCLUSIVE:\n                break", "if verdict == PASSED:\n                break"),
@@ -51,8 +51,8 @@ FAULTS = (
     ("the quarter is a half", "4 * len(inconclusive)", "2 * len(inconclusive)"),
     ("not judged hides a failure", "return 1 if failed else NOT_JUDGED if unjudged", "return NOT_JUDGED if unjudged else 1 if failed"),
     ("nothing ran is a success", "else 0 if passed else 1", "else 0"),
-    ("a sanitizer's report is a matter of time", "(Address|Leak|", "(Leak|"),
-    ("a broken rule in a traceback is a matter of time", "return RULE if re", "return CHECK if re"),
+    ("a sanitizer's report counts as late", "(Address|Leak|", "(Leak|"),
+    ("a broken rule in a traceback counts as late", "return RULE if re", "return CHECK if re"),
     ("what failed is skipped", "return SKIPPED if attempt.skip else PASSED", "return PASSED"),
     ("the runner's own exception is inconclusive", 'the runner failed: {error!r}", CRASH', 'the runner failed: {error!r}", CHECK'),
     ("a sleeper that never writes", "if late_us > LATE_US:", "if False:"),
@@ -60,36 +60,36 @@ FAULTS = (
 )
 
 
-# The same for what reads the runners' sums: (what, file, old, new).
+# The same for the readers of the runners' sums: (fault, file, old, new).
 START, COUNT = "test/all/start", "test/all/count_tests.py"
 READER_FAULTS = (
     (
-        "check believes a second run",
+        "check accepts the result of a second run",
         START,
         "status = 77 if missing else run(command, file)",
         "status = 77 if missing else run(command, file) and run(command, file)",
     ),
-    ("check takes 75 for success", COUNT, "return 1 if sums[1] else 75 if unjudged else int(not sums[0])", "return 1 if sums[1] else int(not sums[0])"),
+    ("check counts 75 as success", COUNT, "return 1 if sums[1] else 75 if unjudged else int(not sums[0])", "return 1 if sums[1] else int(not sums[0])"),
     ("check lets 75 outweigh a failure", COUNT, "return 1 if sums[1] else 75 if unjudged", "return 75 if unjudged else 1 if sums[1]"),
-    ("check takes any status for 75", COUNT, "status not in (0, 77) and not (status == 75 and", "status == 1 and not (status == 75 and"),
+    ("check counts any status as 75", COUNT, "status not in (0, 77) and not (status == 75 and", "status == 1 and not (status == 75 and"),
     ("check cuts the reason of a failure", START, "5 if FAILED", "1 if FAILED"),
     ("check shows a traceback without its exception", START, "20 if REASON", "1 if REASON"),
-    ("check names nothing inconclusive", COUNT, 'above\\n" if inconclusive', 'above\\n" if False'),
-    ("check takes what was killed for skipped", COUNT, '("none", 77 if status == 77 else 1, 0, 0)', '("none", 77, 0, 0)'),
-    ("check shows nothing of what was killed", COUNT, 'if layer == "none":', "if False:"),
-    ("CTest's reader takes 75 for a failure", COUNT, "failed = 75 if NOT_JUDGED.search(output) else 1", "failed = 1"),
+    ("check does not name inconclusive tests", COUNT, 'above\\n" if inconclusive', 'above\\n" if False'),
+    ("check counts a killed step as skipped", COUNT, '("none", 77 if status == 77 else 1, 0, 0)', '("none", 77, 0, 0)'),
+    ("check shows no output of a killed step", COUNT, 'if layer == "none":', "if False:"),
+    ("CTest's reader counts 75 as a failure", COUNT, "failed = 75 if NOT_JUDGED.search(output) else 1", "failed = 1"),
     (
-        "CTest's reader takes 75 for success",
+        "CTest's reader counts 75 as success",
         COUNT,
         'return 1 if sums[1] else 75 if any(line.startswith("real time") for line in lines) else ended',
         "return 1 if sums[1] else 0",
     ),
-    ("CTest's reader believes the sum of what died", COUNT, "return passed, failed or int(judged), skipped", "return passed, failed, skipped"),
+    ("CTest's reader believes the sum of a crashed test", COUNT, "return passed, failed or int(judged), skipped", "return passed, failed, skipped"),
 )
 
 
 class Made:
-    """A session whose attempts are made up: {name: attempts in their order}. `late`: stalls of the machine."""
+    """A session with invented attempts: {name: attempts in order}. `late`: stalls of the machine."""
 
     def __init__(self, attempts, late=()):
         self.attempts, self.late, self.made, self.printed = {name: list(all_of) for name, all_of in attempts.items()}, list(late), [], {}
@@ -108,7 +108,7 @@ class Made:
         self.printed[name] = (kind, attempt.skip, tries)
 
     def run(self):
-        """(exit status, lines, how often each was made)"""
+        """(exit status, lines, number of attempts of each test)"""
         out = io.StringIO()
         with contextlib.redirect_stdout(out):
             self.session.run(list(self.attempts))
@@ -131,13 +131,13 @@ def stall(late_us=200_000, at_us=AT_US):
 class Conclusive(unittest.TestCase):
     def test_failure_names_the_longest_stall_that_was_measured(self):
         for late, words in (((), "meanwhile: 0 ms"), ((stall(7_000), stall(19_000)), "meanwhile: 19 ms")):
-            made, told = Made({"one": [bad(verdict.CHECK)]}, late), []
-            made.session.report = lambda name, kind, attempt, tries, told=told: told.extend(attempt.failures)
+            made, printed = Made({"one": [bad(verdict.CHECK)]}, late), []
+            made.session.report = lambda name, kind, attempt, tries, printed=printed: printed.extend(attempt.failures)
             made.run()
-            self.assertEqual(f"it was wrong\nlongest stall of the machine measured {words}", told[0].text)
+            self.assertEqual(f"it was wrong\nlongest stall of the machine measured {words}", printed[0].text)
 
     def final(self, first, late=()):
-        """One attempt, and a failure although the next one would pass."""
+        """Asserts one attempt, which fails although the next one would pass."""
         status, lines, made = Made({"one": [first, ok(), ok(), ok()], "two": [ok()]}, late).run()
         self.assertEqual((1, ["1 passed, 1 failed, 0 skipped"], 1), (status, lines, made["one"]))
 
@@ -225,7 +225,7 @@ class Status(unittest.TestCase):
         attempts = {f"ok{n}": [ok()] for n in range(passed)} | {f"late{n}": [bad(verdict.CHECK)] * 4 for n in range(inconclusive)} | more
         return Made(attempts, [stall()]).run()
 
-    def test_all_stalled_is_75_and_says_so(self):
+    def test_all_stalled_is_75_and_is_reported(self):
         status, lines, _ = self.of(0, 3)
         self.assertEqual((75, "0 passed, 0 failed, 3 skipped"), (status, lines[-1]))
         self.assertTrue(lines[-2].startswith("real time not judged"), lines)
@@ -234,11 +234,11 @@ class Status(unittest.TestCase):
         self.assertEqual(75, self.of(5, 2)[0])
         self.assertEqual(0, self.of(6, 2)[0])
 
-    def test_a_quarter_of_what_runs_in_real_time(self):
+    def test_quarter_counts_only_tests_in_real_time(self):
         with contextlib.redirect_stdout(io.StringIO()):
             self.assertEqual(75, verdict.summary(100, 0, 2, ["a", "b"], real_time=5))
 
-    def test_failure_outweighs_what_is_not_judged(self):
+    def test_failure_outranks_unjudged_tests(self):
         self.assertEqual(1, self.of(0, 3, bad=[bad(verdict.RULE)])[0])
 
     def test_nothing_that_ran_is_no_success(self):
@@ -262,9 +262,9 @@ class Words(unittest.TestCase):
 
 
 class Processes(unittest.TestCase):
-    """The sleepers themselves."""
+    """Tests the sleepers."""
 
-    def test_sleepers_notice_a_machine_that_stands_still_and_end(self):
+    def test_sleepers_notice_a_stalled_machine_and_end(self):
         witness = verdict.Witness()
         try:
             time.sleep(0.5)
@@ -290,7 +290,7 @@ class Processes(unittest.TestCase):
 
 
 class Check(unittest.TestCase):
-    """./check itself, with the step `system`, whose pytest is a script of this test, and `unit`, whose tests are a file of CTest's output.
+    """./check with the step `system`, whose pytest is a script of this test, and with `unit`, whose tests are a file with CTest's output.
     Both wait for the build, which does nothing here and counts as one."""
 
     FILES = ("check", "docs/developer/proofs.csv", START, COUNT, "test/all/CMakeLists.txt", "test/all/steps.cmake")
@@ -302,10 +302,10 @@ class Check(unittest.TestCase):
         esac
         """
 
-    faulty = {}  # {file: (old, new)}: a fault that is seeded into it
+    faulty = {}  # {file: (old, new)}: a seeded fault
 
     def check(self, runner, *steps, junit=""):
-        """(exit status, lines, how often the runner ran)"""
+        """(exit status, lines, number of runs of the runner)"""
         with tempfile.TemporaryDirectory() as folder:
             files = {name: Path(HERE, "../..", name).read_text(encoding="utf-8") for name in self.FILES}
             for name, (old, new) in self.faulty.items():
@@ -350,7 +350,7 @@ class Check(unittest.TestCase):
         for what in ("reason 5", "150"):
             self.assertNotIn(what, shown)
 
-    def test_exception_behind_a_traceback_is_shown_with_what_came_instead(self):
+    def test_exception_after_traceback_is_shown_with_its_details(self):
         runner = (
             "echo 'FAIL: test_x (x.X)'; seq 301 309; echo \"AssertionError: 'ready' did not come; after the last text came:\"\n"
             "echo busy; seq 401 430; seq 501 540; exit 1\n"
@@ -367,7 +367,7 @@ class Check(unittest.TestCase):
         self.assertRegex(lines[-2], "^real time not judged: system;")
         self.assertRegex(lines[-3], "^1 inconclusive, counted as skipped")
 
-    def test_inconclusive_test_alone_is_told_and_no_failure(self):
+    def test_inconclusive_test_alone_is_reported_and_no_failure(self):
         status, lines, _ = self.check(f"cd {HERE}; python3 -c 'import sys, verdict; sys.exit(verdict.summary(3, 0, 1, [\"row11\"]))'\n", "system")
         self.assertEqual((0, "4 passed, 0 failed, 1 skipped"), (status, lines[-1]), lines)
         self.assertRegex(lines[-2], "^1 inconclusive, counted as skipped")
@@ -376,7 +376,7 @@ class Check(unittest.TestCase):
         for number in (1, 74, 134):
             self.assertEqual(1, self.check(f"echo '4 passed, 0 failed, 0 skipped'; exit {number}\n", "system")[0])
 
-    def test_runner_that_is_killed_fails_check_which_shows_what_it_said(self):
+    def test_runner_killed_fails_check_which_shows_its_output(self):
         status, lines, _ = self.check("echo as far as this; kill -9 $PPID; sleep 5\n", "system")
         self.assertEqual((1, "1 passed, 1 failed, 0 skipped"), (status, lines[-1]), lines)
         self.assertTrue([line for line in lines if line.endswith("as far as this")], lines)
@@ -393,7 +393,7 @@ class Check(unittest.TestCase):
         for junit in (died, late + died, late + self.case("1 passed, 1 failed, 0 skipped\n")):
             self.assertEqual(1, self.check("", "unit", junit=junit)[0], junit)
 
-    def test_failure_of_one_step_outweighs_another_that_is_not_judged(self):
+    def test_failure_of_one_step_outranks_inconclusive_step(self):
         late = self.case("1 inconclusive, counted as skipped: a\nreal time not judged: more\n2 passed, 0 failed, 1 skipped\n")
         self.assertEqual(1, self.check("echo '1 passed, 1 failed, 0 skipped'; exit 1\n", "unit", "system", junit=late)[0])
 
@@ -411,7 +411,7 @@ def seed(old, new):
         return None
     sound, faulty = verdict, types.ModuleType("verdict")
     with tempfile.TemporaryDirectory() as folder:
-        faulty.__file__ = os.path.join(folder, "verdict.py")  # Sleepers are started from it.
+        faulty.__file__ = os.path.join(folder, "verdict.py")  # The sleepers are started from this file.
         with open(faulty.__file__, "w", encoding="utf-8") as file:
             file.write(text.replace(old, new))
         exec(compile(text.replace(old, new), faulty.__file__, "exec"), faulty.__dict__)
@@ -419,7 +419,7 @@ def seed(old, new):
         try:
             suite().run(result)
             if result.wasSuccessful():
-                Processes("test_sleepers_notice_a_machine_that_stands_still_and_end").run(result)
+                Processes("test_sleepers_notice_a_stalled_machine_and_end").run(result)
         finally:
             verdict = sound
     return [case.id().split(".")[-1] for case, _ in result.failures + result.errors]
@@ -439,7 +439,7 @@ def main():
     for what, noticed in seeded:
         print(
             f"{'ok  ' if noticed else 'FAIL'} seeded fault: {what}: "
-            + ("its text is not in verdict.py once" if noticed is None else ", ".join(noticed) or "no test notices it")
+            + ("its code does not occur exactly once in verdict.py" if noticed is None else ", ".join(noticed) or "no test notices it")
         )
         passed, failed = passed + bool(noticed), failed + (not noticed)
     print(f"{passed} passed, {failed} failed, 0 skipped")

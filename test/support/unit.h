@@ -10,7 +10,7 @@ typedef struct {
     int line;
 } unit_test_t;
 
-/// A test of Unity that no list names: the linker lists all of a program, and `main` of unit_main.c runs them in the order of their lines.
+/// A test of Unity that is in no list: the linker collects all tests of a program, and `main` of unit_main.c runs them in the order of their lines.
 #define TEST(test)                                                                                                     \
     static void test(void);                                                                                            \
     static const unit_test_t test##_entry = {(test), #test, __FILE__, __LINE__};                                       \

@@ -3,15 +3,15 @@
 
 #include "unit.h"
 
-// The linker's, for a section whose name is one of C.
+// The linker defines these for a section whose name is a C identifier.
 extern const unit_test_t *const __start_unit_tests[], *const __stop_unit_tests[];
 
-// Of tests that prepare nothing.
+// For tests that prepare nothing.
 __attribute__((weak)) void setUp(void) {}
 
 __attribute__((weak)) void tearDown(void) {}
 
-/// The first test behind that line, NULL at the end: a compiler may give them in any order.
+/// Returns the first test after that line, NULL at the end: a compiler may emit them in any order.
 static const unit_test_t *next(int line) {
     const unit_test_t *first = NULL;
     for (const unit_test_t *const *test = __start_unit_tests; test != __stop_unit_tests; test++) {
@@ -28,7 +28,7 @@ int main(void) {
         Unity.TestFile = test->file;
         UnityDefaultTestRun(test->run, test->name, test->line);
     }
-    // Of two in one line, in two files, one would be lost.
+    // If two tests in two files have the same line, one would not run.
     const int lost = (__stop_unit_tests - __start_unit_tests) - (ptrdiff_t)Unity.NumberOfTests != 0;
     return UNITY_END() + lost;
 }

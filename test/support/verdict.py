@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Decides what a test in real time has shown. A conclusive verdict is final: nothing repeats it.
+"""Judges the result of a test in real time. A conclusive verdict is final: nothing repeats it.
 
     attempt --no failure-------------------------------------------------------> PASSED
             --RULE: a safety rule was broken-----------------------------------> FAILED, whatever the machine did
@@ -7,8 +7,8 @@
             --TIMING, CHECK: no measured stall is long and near enough---------> FAILED
             --TIMING, CHECK: a measured stall can have caused each of them-----> INCONCLUSIVE
 
-An inconclusive test runs again, alone, at most RETRIES times, until an attempt is conclusive. If none is, the test counts as skipped, by
-name, with the stall. The module depends on no runner: a runner passes a function that makes one attempt, and one that prints a verdict.
+An inconclusive test runs again, alone, at most RETRIES times, until an attempt is conclusive. If none is, the test counts as skipped; its
+name and the stall are printed. The module does not depend on a runner: a runner passes one function that makes an attempt and one that prints a verdict.
 
     verdict.py --run NAME COMMAND...    the same for a command that is a test
 """
@@ -45,17 +45,17 @@ GATEWAY_LATE = re.compile(r"gateway\s+itself\s+was\s+held\s+up\s+for\s+(\d+)\s+m
 
 
 class RuleBroken(AssertionError):
-    """A test raises this when a safety rule was broken: motion without permission, a latch that does not hold. See `hold`."""
+    """A test raises this if a safety rule was broken: motion without permission, a latch that does not hold. See `hold`."""
 
 
 def hold(condition, text):
-    """A safety rule, for tests that fail by exceptions."""
+    """Checks a safety rule, in tests that fail by exceptions."""
     if not condition:
         raise RuleBroken(text)
 
 
 class Found(AssertionError):
-    """A test raises this, or pytest_verdict.py for it, with failures of which it knows more than their words."""
+    """A test, or pytest_verdict.py for it, raises this with failures of which it knows more than their texts."""
 
     def __init__(self, failures):
         super().__init__("\n".join(f"{failure.kind}: {failure.text}" for failure in failures))
@@ -63,7 +63,7 @@ class Found(AssertionError):
 
 
 class Failure(NamedTuple):
-    """`need_us`: the shortest stall that can have caused it, e.g. by how much a limit was missed. None: unknown."""
+    """`need_us`: the shortest stall that can have caused the failure, e.g. the time by which a limit was missed. None: unknown."""
 
     text: str
     kind: str = CHECK
@@ -80,13 +80,13 @@ class Attempt(NamedTuple):
     claims: list = []
     begin_us: int = 0
     end_us: int = 0
-    tests: int = 1  # what it counts as, if nothing failed
-    skips: int = 0  # of those
-    data: Any = None  # the runner's own
+    tests: int = 1  # number of tests that it counts as, if nothing failed
+    skips: int = 0  # skipped tests among them
+    data: Any = None  # data of the runner
 
 
 class Evidence:
-    """What a test collects while it runs, for an Attempt. `data`: what else its folder wants to know."""
+    """Findings of a test for its Attempt. `data`: other data for the test's folder."""
 
     def __init__(self):
         self.failures, self.figures, self.stalls, self.claims, self.data = [], [], [], [], {}
@@ -97,17 +97,17 @@ def now_us():
 
 
 def kind_of(text):
-    """By the words of a failure: a traceback, or the output of a program."""
+    """The kind of a failure with this text: a traceback, or the output of a program."""
     return RULE if re.search(r"\bRuleBroken\b", text) else CRASH if DIED.search(text) else CHECK
 
 
 def of_text(text, **fields):
-    """The attempt of a test that failed with these words."""
+    """The attempt of a test that failed with this text."""
     return Attempt([Failure(text, kind_of(text))], claims=[(now_us(), int(ms) * 1000) for ms in GATEWAY_LATE.findall(text)], **fields)
 
 
 def die_with_parent():
-    """Called in a child."""
+    """Called in a child process."""
     ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
@@ -116,7 +116,7 @@ def within(stalls, begin_us, end_us):
 
 
 def spans_us(stalls):
-    """How long the machine was stalled each time: stalls that overlap, on several processors, are one."""
+    """The durations of the stalls; stalls that overlap, on several processors, are one."""
     spans = []
     for begin_us, end_us in sorted((at_us - late_us, at_us) for at_us, late_us in stalls):
         if spans and begin_us <= spans[-1][1]:
@@ -127,7 +127,7 @@ def spans_us(stalls):
 
 
 def explains(failure, stalls, claims=()):
-    """Whether these stalls, all of them near enough, can have caused the failure."""
+    """True if these stalls, all near enough in time, can have caused the failure."""
     if failure.kind not in (TIMING, CHECK) or not stalls:
         return False
     spans = spans_us([*stalls, *claims])
@@ -136,14 +136,14 @@ def explains(failure, stalls, claims=()):
 
 
 def read_stalls(path, begin_us, end_us, more_than_us=0):
-    """What sleepers wrote into that file, of this time."""
+    """The stalls of this time that the sleepers wrote to that file."""
     with open(path, encoding="ascii") as file:
         pairs = [tuple(map(int, line.split())) for line in file if line.endswith("\n")]
     return within([pair for pair in pairs if pair[1] > more_than_us], begin_us, end_us)
 
 
 class Witness:
-    """One sleeper on each processor, in processes of their own, until `close`. They end with this process too."""
+    """One sleeper on each processor, each a process, until `close`. They also end with this process."""
 
     def __init__(self, nice=0):
         self.folder = tempfile.mkdtemp(prefix="iwheel-witness-")
@@ -161,7 +161,7 @@ class Witness:
 
 
 class Session:
-    """Runs tests and counts. `attempt(name)` makes an Attempt; `report(name, verdict, attempt, tries)` prints one verdict."""
+    """Runs and counts tests. `attempt(name)` makes an Attempt; `report(name, verdict, attempt, tries)` prints one verdict."""
 
     def __init__(self, attempt=None, report=None, witness=None):
         self.attempt, self.report, self.witness = attempt, report, witness
@@ -172,11 +172,11 @@ class Session:
         return self.witness.stalls(begin_us, end_us)
 
     def measured(self, attempt, begin_us, end_us):
-        """By the sleepers, and by the test itself."""
+        """Stalls measured by the sleepers and by the test itself."""
         return self.stalls(begin_us, end_us) + within(attempt.stalls, begin_us, end_us)
 
     def await_quiet(self):
-        """Until no sleeper was late for a second, but not for ever."""
+        """Waits until no sleeper was late for a second, at most PATIENCE_S."""
         end = time.monotonic() + PATIENCE_S
         while self.stalls(now_us() - QUIET_US, now_us()) and time.monotonic() < end:
             time.sleep(POLL_S)
@@ -204,7 +204,7 @@ class Session:
         return self.verdict_of(attempt), attempt
 
     def again(self, name):
-        """(verdict, attempt, how many): of an inconclusive test, alone, until an attempt is conclusive."""
+        """(verdict, attempt, number of attempts): repeats an inconclusive test, alone, until an attempt is conclusive."""
         for tries in range(1, RETRIES + 1):  # noqa: B007
             self.await_quiet()
             verdict, attempt = self.once(name)
@@ -213,11 +213,11 @@ class Session:
         return verdict, attempt, tries
 
     def stall_ms(self, attempt):
-        """The longest that was measured during the attempt."""
+        """The longest stall measured during the attempt."""
         return max((late_us for _, late_us in self.measured(attempt, attempt.begin_us, attempt.end_us)), default=0) / 1000
 
     def take(self, name, verdict, attempt, tries=1):
-        """Counts and prints a verdict. An inconclusive one counts as skipped."""
+        """Counts and prints a verdict. An inconclusive test counts as skipped."""
         if verdict == INCONCLUSIVE:
             self.inconclusive.append(name)
             attempt = attempt._replace(skip=f"inconclusive in each of {tries} attempts: the machine stalled for up to {self.stall_ms(attempt):.0f} ms")
@@ -233,7 +233,7 @@ class Session:
         self.report(name, verdict, attempt, tries)
 
     def run(self, names, jobs=1):
-        """Each test once, `jobs` at a time; then the inconclusive ones again, one by one."""
+        """Runs each test once, `jobs` in parallel; then the inconclusive ones again, one by one."""
         undecided = []
 
         def first(name):
@@ -255,15 +255,15 @@ class Session:
 
 
 def summary(passed, failed, skipped, inconclusive=(), repeated=(), real_time=None):
-    """Prints the last lines of a runner: "N passed, N failed, N skipped", and before it what was inconclusive. Returns the exit status.
-    `real_time`: how many of the tests ran in real time, if not all."""
+    """Prints the last lines of a runner: the inconclusive tests, then "N passed, N failed, N skipped". Returns the exit status.
+    `real_time`: the number of tests that ran in real time, if not all."""
     unjudged = 4 * len(inconclusive) > (passed + failed + skipped if real_time is None else real_time)
     if repeated:
         print(f"judged in a later attempt, because the machine stalled in the first: {', '.join(repeated)}")
     if inconclusive:
         print(f"{len(inconclusive)} inconclusive, counted as skipped: {', '.join(inconclusive)}")
     if unjudged:
-        print("real time not judged: more than a quarter is inconclusive; run it on a machine that does less")
+        print("real time not judged: more than a quarter is inconclusive; repeat on a machine with less load")
     print(f"{passed} passed, {failed} failed, {skipped} skipped", flush=True)
     return 1 if failed else NOT_JUDGED if unjudged else 0 if passed else 1
 
@@ -280,7 +280,7 @@ def sleep_on(file, parent):
 
 
 def sleepers(path, nice):
-    """On each processor one, with the priority of what the tests run."""
+    """Runs one sleeper on each processor, with the priority of the tests' programs."""
     with contextlib.suppress(PermissionError):
         os.setpriority(os.PRIO_PROCESS, 0, nice)
     parent, own, processors = os.getppid(), os.getpid(), sorted(os.sched_getaffinity(0))[:PROCESSORS_MAX]
@@ -295,7 +295,7 @@ def sleepers(path, nice):
 
 
 def report(name, verdict, attempt, tries):
-    """Prints a verdict in a line, and why."""
+    """Prints a verdict in one line, and the reason."""
     words = "\n".join(failure.text for failure in attempt.failures)
     later = f", attempt {tries}, alone" if tries > 1 else ""
     seconds = (attempt.end_us - attempt.begin_us) / 1e6
@@ -304,7 +304,7 @@ def report(name, verdict, attempt, tries):
 
 
 def run_all(names, attempt, jobs=1, tell=report):
-    """All of a runner's tests, next to a witness. Returns the session: `end` sums up."""
+    """Runs all tests of a runner next to a witness. Returns the session; `end` prints the sums."""
     session = Session(attempt, tell, Witness())
     try:
         session.run(names, jobs)
@@ -314,7 +314,7 @@ def run_all(names, attempt, jobs=1, tell=report):
 
 
 def run_command(name, command):
-    """One command is the test. Prints its output, and returns the exit status of a runner; 77 of the command means skipped."""
+    """Runs one command as a test. Prints its output and returns the exit status of a runner; status 77 of the command means skipped."""
 
     def attempt(_):
         done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace", check=False)

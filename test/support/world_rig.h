@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// The real core and the simulated pair of wheels on one bus, in virtual time, with the evidence from motion beside them.
+/// The real core and the simulated pair of wheels on one bus, in virtual time, together with the observation of motion.
 #ifndef TEST_WORLD_RIG_H
 #define TEST_WORLD_RIG_H
 
@@ -17,20 +17,20 @@ typedef struct {
     iw_gateway_t gateway;
     iw_observation_t observation;
     iw_time_us_t now_us;
-    iw_can_frame_t rx[WORLD_RX_MAX]; ///< What came since the last step.
+    iw_can_frame_t rx[WORLD_RX_MAX]; ///< Frames received since the last step.
     unsigned rx_count;
     unsigned rx_next;
     uint8_t port;
 } world_rig_t;
 
-/// Wheels that boot now (`uptime_us` 0) or have been running so long, and a gateway with the rig's configuration beside
-/// them; then it runs for a second.
+/// Begins with wheels that boot now (`uptime_us` 0) or have been running that long, and a gateway with the rig's
+/// configuration; then runs for a second.
 void world_rig_begin(world_rig_t *self, iw_time_us_t uptime_us);
 
-/// Another gateway on the same wheels, as after a restart.
+/// Replaces the gateway by another one on the same wheels, as a restart does.
 void world_rig_restart(world_rig_t *self);
 
-/// Lets time pass, with a step every millisecond.
+/// Lets time pass with a step every millisecond.
 void world_rig_run(world_rig_t *self, unsigned for_ms);
 
 /// Arms and drives for that long, with a command every 50 ms.

@@ -39,7 +39,7 @@ def test_screen_shows(text):
     assert re.search(text, screen())
 
 
-def test_another_program_hears_the_serial_port_and_is_answered_there():
+def test_second_program_on_serial_port_receives_answers():
     process = emulate("stm32f407", "--image", "listen")
     name = re.search(r"/dev/\S+(?=;)", process.stdout.readline())
     terminal = os.open(name[0], os.O_RDWR | os.O_NOCTTY)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Age of an event as 32 bits in microseconds. UINT32_MAX stands for a longer age, for an event that never happened and
+// Age of an event as 32 bits in microseconds. UINT32_MAX means a longer age, for an event that never happened and
 // for a future one.
 #include "arithmetic.h"
 

@@ -257,11 +257,11 @@ TEST(test_assumptions_file_how_is_written_only_if_set) {
 static bool believed(void) {
     length = gw_assumptions_file_write(&known, BUS, text, sizeof text);
     TEST_ASSERT_GREATER_THAN_UINT(0, length);
-    const bool taken = gw_assumptions_file_read(text, length, BUS, &got, reason);
-    if (!taken) {
+    const bool accepted = gw_assumptions_file_read(text, length, BUS, &got, reason);
+    if (!accepted) {
         TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reason, "measured"), reason);
     }
-    return taken;
+    return accepted;
 }
 
 TEST(test_assumptions_file_bus_figure_beyond_limits_is_refused) {
@@ -311,7 +311,7 @@ TEST(test_assumptions_file_bus_source_of_operator_item_is_refused) {
         fill_item(items[i]);
         TEST_ASSERT_TRUE(believed());
         known.item[items[i]].entry.figure = 1;
-        TEST_ASSERT_FALSE_MESSAGE(believed(), "the operator gives no figure");
+        TEST_ASSERT_FALSE_MESSAGE(believed(), "the operator states no figure");
         known.item[items[i]].entry.figure = 0;
         known.item[items[i]].entry.source = IW_SOURCE_BUS;
         TEST_ASSERT_FALSE(believed());

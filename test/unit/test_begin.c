@@ -14,21 +14,21 @@
 
 #define COUNT(array) ((int)(sizeof(array) / sizeof(array)[0]))
 
-static int kept[3];
+static int saved[3];
 
 void setUp(void) {
     (void)fflush(stdout); // One test opens stdout again.
-    for (int fd = 0; fd < COUNT(kept); fd++) {
-        kept[fd] = fcntl(fd, F_DUPFD_CLOEXEC, COUNT(kept));
+    for (int fd = 0; fd < COUNT(saved); fd++) {
+        saved[fd] = fcntl(fd, F_DUPFD_CLOEXEC, COUNT(saved));
     }
     (void)signal(SIGPIPE, SIG_DFL);
 }
 
 void tearDown(void) {
     (void)fflush(stderr);
-    for (int fd = 0; fd < COUNT(kept); fd++) {
-        (void)dup2(kept[fd], fd);
-        (void)close(kept[fd]);
+    for (int fd = 0; fd < COUNT(saved); fd++) {
+        (void)dup2(saved[fd], fd);
+        (void)close(saved[fd]);
     }
 }
 
@@ -47,27 +47,27 @@ TEST(test_begin_write_to_closed_log_returns_error) {
     (void)close(ends[1]);
     const int code = begin(NULL);
     const ssize_t count = write(STDERR_FILENO, "x", 1);
-    (void)dup2(kept[STDERR_FILENO], STDERR_FILENO);
+    (void)dup2(saved[STDERR_FILENO], STDERR_FILENO);
     TEST_ASSERT_EQUAL_INT(0, code);
     TEST_ASSERT_EQUAL_INT(-1, count);
 }
 
 TEST(test_begin_closed_streams_are_opened) {
     struct stat null;
-    struct stat found[COUNT(kept)] = {{.st_rdev = 0}};
-    for (int fd = 0; fd < COUNT(kept); fd++) {
+    struct stat found[COUNT(saved)] = {{.st_rdev = 0}};
+    for (int fd = 0; fd < COUNT(saved); fd++) {
         (void)close(fd);
     }
     (void)begin(NULL);
     const int next = open("/dev/zero", O_RDONLY | O_CLOEXEC);
-    for (int fd = 0; fd < COUNT(kept); fd++) {
+    for (int fd = 0; fd < COUNT(saved); fd++) {
         (void)fstat(fd, &found[fd]);
-        (void)dup2(kept[fd], fd);
+        (void)dup2(saved[fd], fd);
     }
     TEST_ASSERT_EQUAL_INT(0, stat("/dev/null", &null));
     TEST_ASSERT_TRUE(next > STDERR_FILENO);
     (void)close(next);
-    for (int fd = 0; fd < COUNT(kept); fd++) {
+    for (int fd = 0; fd < COUNT(saved); fd++) {
         TEST_ASSERT_TRUE(null.st_rdev == found[fd].st_rdev);
     }
 }

@@ -130,11 +130,11 @@ TEST(test_ring_every_kind_of_entry_is_returned_unchanged) {
 
 TEST(test_ring_frame_stores_dlc_bytes_only) {
     const blackbox_entry_t entry = {.kind = BLACKBOX_FRAME, .a = 3, .as = {.data = {1, 2, 3, 4, 5, 6, 7, 8}}};
-    const uint8_t kept[IW_CAN_DATA_MAX] = {1, 2, 3};
+    const uint8_t stored[IW_CAN_DATA_MAX] = {1, 2, 3};
     size_t count;
     blackbox_ring_put(ring, &entry);
     (void)blackbox_ring_copy(ring, 0, 1, out, &count);
-    TEST_ASSERT_EQUAL_MEMORY(kept, out[0].as.data, sizeof kept);
+    TEST_ASSERT_EQUAL_MEMORY(stored, out[0].as.data, sizeof stored);
 }
 
 TEST(test_ring_distant_and_decreasing_times_are_returned) {

@@ -24,7 +24,7 @@ static char armed_key[BRIDGE_SECRET_SIZE];
 
 static const char *const ARM = "{\"cmd\":\"arm\",\"name\":\"a\"}";
 static const char *const DRIVE = "{\"cmd\":\"drive\",\"left_mm_s\":100,\"right_mm_s\":100}";
-static const char *const GIVEN = ",\"state\":\"armed\",\"key\":\"00112233445566778899aabbccddeeff\"";
+static const char *const GRANTED = ",\"state\":\"armed\",\"key\":\"00112233445566778899aabbccddeeff\"";
 static const char *const KEY = "00112233445566778899aabbccddeeff";
 
 static void take_answer(void *context, const iwc_message_t *reply) {
@@ -74,7 +74,7 @@ TEST(test_lease_viewer_has_no_connection) {
 }
 
 TEST(test_one_person_gateway_key_is_sent_in_each_drive) {
-    arm("a", true, GIVEN);
+    arm("a", true, GRANTED);
     TEST_ASSERT_EQUAL_STRING(KEY, armed_key);
     TEST_ASSERT_EQUAL_STRING("a", bridge_lease_name(&lease));
     TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK,
@@ -95,7 +95,7 @@ TEST(test_one_person_without_gateway_key_gets_a_random_key) {
 TEST(test_one_person_other_key_never_drives) {
     static const char *const wrong[] = {NULL, "", "00112233445566778899aabbccddeefe", "00112233445566778899aabbccddeef",
                                         "00112233445566778899aabbccddeefff"};
-    arm("a", true, GIVEN);
+    arm("a", true, GRANTED);
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
         TEST_ASSERT_EQUAL(BRIDGE_LEASE_WRONG,
                           bridge_lease_drive(&lease, wrong[i], DRIVE, (bridge_asker_t){NULL, NULL}, now_us));
@@ -104,7 +104,7 @@ TEST(test_one_person_other_key_never_drives) {
 }
 
 TEST(test_one_person_second_is_refused_and_first_drives_on) {
-    arm("a", true, GIVEN);
+    arm("a", true, GRANTED);
     arm("b", false, ",\"error\":\"busy\",\"message\":\"a drives\"");
     TEST_ASSERT_NOT_NULL(strstr(last, "busy"));
     TEST_ASSERT_TRUE(fake_gateway_is_closed(&gateway, 1));
@@ -114,7 +114,7 @@ TEST(test_one_person_second_is_refused_and_first_drives_on) {
 }
 
 TEST(test_one_person_third_is_busy_while_second_asks) {
-    arm("a", true, GIVEN);
+    arm("a", true, GRANTED);
     TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK, bridge_lease_arm(&lease, "b", ARM, (bridge_asker_t){take_answer, NULL}, now_us));
     TEST_ASSERT_EQUAL(BRIDGE_LEASE_BUSY,
                       bridge_lease_arm(&lease, "c", ARM, (bridge_asker_t){take_answer, NULL}, now_us));
@@ -123,7 +123,7 @@ TEST(test_one_person_third_is_busy_while_second_asks) {
 }
 
 TEST(test_one_person_takeover_ends_the_previous_holder) {
-    arm("a", true, GIVEN);
+    arm("a", true, GRANTED);
     arm("b", true, ",\"key\":\"ffeeddccbbaa99887766554433221100\"");
     TEST_ASSERT_EQUAL_STRING("b", bridge_lease_name(&lease));
     TEST_ASSERT_TRUE(fake_gateway_is_closed(&gateway, 0));
@@ -131,7 +131,7 @@ TEST(test_one_person_takeover_ends_the_previous_holder) {
 }
 
 TEST(test_lease_end_voids_the_key_before_the_connection) {
-    arm("a", true, GIVEN);
+    arm("a", true, GRANTED);
     bridge_lease_end(&lease, now_us);
     TEST_ASSERT_NULL(bridge_lease_name(&lease));
     TEST_ASSERT_EQUAL(BRIDGE_LEASE_WRONG, bridge_lease_drive(&lease, KEY, DRIVE, (bridge_asker_t){NULL, NULL}, now_us));
@@ -143,11 +143,11 @@ TEST(test_lease_end_voids_the_key_before_the_connection) {
 }
 
 TEST(test_lease_ending_connection_frees_its_place_for_arm) {
-    arm("a", true, GIVEN);
+    arm("a", true, GRANTED);
     bridge_lease_end(&lease, now_us);
-    arm("b", true, GIVEN);
+    arm("b", true, GRANTED);
     bridge_lease_end(&lease, now_us);
-    arm("c", true, GIVEN);
+    arm("c", true, GRANTED);
     TEST_ASSERT_EQUAL_STRING("c", bridge_lease_name(&lease));
     TEST_ASSERT_TRUE(fake_gateway_is_closed(&gateway, 0) || fake_gateway_is_closed(&gateway, 1));
 }
@@ -173,7 +173,7 @@ TEST(test_lease_forgotten_asker_gets_no_lease) {
 }
 
 TEST(test_lease_reply_not_holder_ends_the_lease) {
-    arm("a", true, GIVEN);
+    arm("a", true, GRANTED);
     TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK,
                       bridge_lease_drive(&lease, KEY, DRIVE, (bridge_asker_t){take_answer, NULL}, now_us));
     TEST_ASSERT_TRUE(fake_gateway_read(&gateway, 0, line, sizeof line));
@@ -185,7 +185,7 @@ TEST(test_lease_reply_not_holder_ends_the_lease) {
 }
 
 TEST(test_lease_lost_connection_answers_drives_once) {
-    arm("a", true, GIVEN);
+    arm("a", true, GRANTED);
     for (int i = 0; i < 4; i++) {
         TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK,
                           bridge_lease_drive(&lease, KEY, DRIVE, (bridge_asker_t){take_answer, NULL}, now_us));

@@ -16,14 +16,14 @@ void tearDown(void) {}
 
 static void test_service_write_to_closed_log_returns_error(void) {
     static const char words[] = "iwheel: a line\n";
-    const int kept = dup(STDERR_FILENO);
+    const int saved = dup(STDERR_FILENO);
     int ends[2];
     TEST_ASSERT_EQUAL_INT(0, pipe(ends));
     (void)close(ends[0]);
     (void)dup2(ends[1], STDERR_FILENO);
     const ssize_t count = write(STDERR_FILENO, words, sizeof words - 1U);
-    (void)dup2(kept, STDERR_FILENO);
-    (void)close(kept);
+    (void)dup2(saved, STDERR_FILENO);
+    (void)close(saved);
     (void)close(ends[1]);
     TEST_ASSERT_EQUAL_INT(-1, count);
 }

@@ -24,7 +24,7 @@ static void give_bytes(const char *text, size_t length) {
     TEST_ASSERT_EQUAL(length, write(ends[1], text, length));
 }
 
-static void give(const char *text) {
+static void read_text(const char *text) {
     give_bytes(text, strlen(text));
 }
 
@@ -54,7 +54,7 @@ static void expect_end(void) {
 }
 
 TEST(test_reader_byte_order_mark_is_skipped) {
-    give("\xef\xbb\xbf(1.0) can0 100#00\n(1.1) can0 120#00\n");
+    read_text("\xef\xbb\xbf(1.0) can0 100#00\n(1.1) can0 120#00\n");
     end_input();
     expect_frame(0x100, 1);
     expect_frame(0x120, 2);
@@ -63,7 +63,7 @@ TEST(test_reader_byte_order_mark_is_skipped) {
 
 TEST(test_reader_foreign_format_is_reported_once) {
     candump_t frame;
-    give("date Tue Nov 14 22:13:20 2023\nbase hex  timestamps absolute\n0.0 1 10A Rx d 0\n");
+    read_text("date Tue Nov 14 22:13:20 2023\nbase hex  timestamps absolute\n0.0 1 10A Rx d 0\n");
     end_input();
     TEST_ASSERT_EQUAL(CANDUMP_READ_FOREIGN, candump_reader_next(&reader, &frame));
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reader.why, "asc2log"), reader.why);
@@ -80,13 +80,13 @@ TEST(test_reader_frame_line_is_never_a_foreign_format) {
     for (size_t i = 0; i < sizeof lines / sizeof lines[0]; i++) {
         candump_t frame;
         candump_reader_init(&reader, ends[0]);
-        give(lines[i]);
+        read_text(lines[i]);
         TEST_ASSERT_EQUAL_MESSAGE(CANDUMP_READ_FRAME, candump_reader_next(&reader, &frame), lines[i]);
     }
 }
 
 TEST(test_reader_lines_are_returned_with_their_numbers) {
-    give("(1.0) can0 100#00\r\n\n# comment\n(1.1) can0 120#00\nrubbish\n(1.2) can0 200#\n");
+    read_text("(1.0) can0 100#00\r\n\n# comment\n(1.1) can0 120#00\nrubbish\n(1.2) can0 200#\n");
     end_input();
     expect_frame(0x100, 1);
     expect_frame(0x120, 4);
@@ -101,16 +101,16 @@ TEST(test_reader_empty_input_ends) {
 }
 
 TEST(test_reader_line_is_returned_before_the_input_ends) {
-    give("(1.0) can0 100#00\n(1.1) can");
+    read_text("(1.0) can0 100#00\n(1.1) can");
     expect_frame(0x100, 1);
-    give("0 101#00\n");
+    read_text("0 101#00\n");
     expect_frame(0x101, 2);
     end_input();
     expect_end();
 }
 
 TEST(test_reader_last_line_without_newline_is_bad) {
-    give("(1.0) can0 100#0011\n(1.1) can0 100#00");
+    read_text("(1.0) can0 100#0011\n(1.1) can0 100#00");
     end_input();
     expect_frame(0x100, 1);
     expect_bad(2, "may be cut");
@@ -118,7 +118,7 @@ TEST(test_reader_last_line_without_newline_is_bad) {
 }
 
 TEST(test_reader_blank_rest_is_ignored) {
-    give("(1.0) can0 100#0011\n \t");
+    read_text("(1.0) can0 100#0011\n \t");
     end_input();
     expect_frame(0x100, 1);
     expect_end();
@@ -128,10 +128,10 @@ TEST(test_reader_overlong_line_is_bad_and_the_next_is_read) {
     char long_line[5000];
     memset(long_line, '(', sizeof long_line);
     long_line[sizeof long_line - 1U] = '\n';
-    give("(1.0) can0 100#00\n");
+    read_text("(1.0) can0 100#00\n");
     give_bytes(long_line, sizeof long_line);
     give_bytes(long_line, sizeof long_line);
-    give("(1.1) can0 101#00\n");
+    read_text("(1.1) can0 101#00\n");
     end_input();
     expect_frame(0x100, 1);
     expect_bad(2, "longer than any frame");
@@ -160,7 +160,7 @@ TEST(test_reader_input_larger_than_the_buffer_is_complete) {
     uint64_t line = 0;
     for (unsigned round = 0; round < 30U; round++) {
         for (unsigned i = 0; i < 200U; i++) {
-            give("(1.0) can0 100#0011223344556677\n");
+            read_text("(1.0) can0 100#0011223344556677\n");
         }
         for (unsigned i = 0; i < 200U; i++) {
             expect_frame(0x100, ++line);

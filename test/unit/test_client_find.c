@@ -104,7 +104,7 @@ TEST(test_find_two_sockets_of_one_gateway_returns_drive_socket) {
 
 TEST(test_find_without_right_to_drive_returns_watch_socket) {
     if (geteuid() != 0) {
-        TEST_IGNORE_MESSAGE("needs root to become somebody else");
+        TEST_IGNORE_MESSAGE("needs root to change the user");
     }
     add_pair();
     TEST_ASSERT_EQUAL_INT(0, seteuid(65534));
@@ -116,7 +116,7 @@ TEST(test_find_without_right_to_drive_returns_watch_socket) {
 
 TEST(test_find_without_any_right_returns_drive_socket) {
     if (geteuid() != 0) {
-        TEST_IGNORE_MESSAGE("needs root to become somebody else");
+        TEST_IGNORE_MESSAGE("needs root to change the user");
     }
     add_pair();
     TEST_ASSERT_EQUAL_INT(0, chmod(path_of("watch/can0.sock"), 0600));

@@ -18,7 +18,7 @@ static int server;
 static char out[IWC_PIECE_MAX];
 static iwc_piece_t piece;
 
-static void say(const char *text) {
+static void reply(const char *text) {
     TEST_ASSERT_EQUAL((ssize_t)strlen(text), send(server, text, strlen(text), MSG_NOSIGNAL));
 }
 
@@ -28,7 +28,7 @@ void setUp(void) {
     TEST_ASSERT_EQUAL_INT(0, socketpair(AF_UNIX, SOCK_STREAM, 0, pair));
     server = pair[1];
     gateway = iwc_new();
-    say("{\"event\":\"hello\",\"name\":\"iwheel-gateway\",\"api\":1,\"state\":\"listening\",\"client\":7}\n");
+    reply("{\"event\":\"hello\",\"name\":\"iwheel-gateway\",\"api\":1,\"state\":\"listening\",\"client\":7}\n");
     TEST_ASSERT_EQUAL(IWC_OK, iwc_adopt(gateway, pair[0], SOON));
 }
 
@@ -41,7 +41,7 @@ void tearDown(void) {
 static iwc_result_t ask(int64_t next, uint32_t crc32, const char *fields) {
     char line[512];
     (void)snprintf(line, sizeof line, "{\"id\":2,\"ok\":true,\"name\":\"" NAME "\",%s}\n", fields);
-    say(line);
+    reply(line);
     piece = (iwc_piece_t){.next = next, .crc32 = crc32};
     return iwc_recording(gateway, NAME, SOON, out, &piece);
 }
@@ -50,14 +50,14 @@ static iwc_result_t ask(int64_t next, uint32_t crc32, const char *fields) {
 #define WHOLE "\"data\":\"MTIzNDU2Nzg5\",\"crc32\":3421780262"
 
 TEST(test_recording_last_piece_has_both_checksums) {
-    char heard[256] = "";
+    char request[256] = "";
     TEST_ASSERT_EQUAL(IWC_OK, ask(0, 0, "\"offset\":0,\"size\":9," WHOLE ",\"file_crc32\":3421780262"));
     TEST_ASSERT_EQUAL_STRING_LEN("123456789", out, 9);
     TEST_ASSERT_EQUAL(9, piece.length);
     TEST_ASSERT_EQUAL_INT64(9, piece.size);
     TEST_ASSERT_EQUAL_HEX32(0xCBF43926U, piece.crc32);
-    TEST_ASSERT_GREATER_THAN(0, recv(server, heard, sizeof heard - 1U, 0));
-    TEST_ASSERT_EQUAL_STRING("{\"id\":2,\"cmd\":\"recording\",\"name\":\"" NAME "\",\"offset\":0}\n", heard);
+    TEST_ASSERT_GREATER_THAN(0, recv(server, request, sizeof request - 1U, 0));
+    TEST_ASSERT_EQUAL_STRING("{\"id\":2,\"cmd\":\"recording\",\"name\":\"" NAME "\",\"offset\":0}\n", request);
 }
 
 TEST(test_recording_second_piece_continues_the_checksum) {
@@ -102,7 +102,7 @@ TEST(test_recording_overlong_piece_is_not_written) {
                      "{\"id\":2,\"ok\":true,\"name\":\"" NAME "\",\"offset\":0,\"size\":99999,\"data\":\"");
     memset(line + n, 'A', 32772);
     (void)snprintf(line + n + 32772, sizeof line - 40000U, "\",\"crc32\":0,\"file_crc32\":null}\n");
-    say(line);
+    reply(line);
     static char guarded[IWC_PIECE_MAX + 1U];
     guarded[IWC_PIECE_MAX] = 'X';
     TEST_ASSERT_EQUAL(IWC_GARBLED, iwc_recording(gateway, NAME, SOON, guarded, &piece));
@@ -121,7 +121,7 @@ TEST(test_recording_invalid_name_is_not_sent) {
 }
 
 TEST(test_recording_refusal_does_not_end_the_connection) {
-    say("{\"id\":2,\"ok\":false,\"error\":\"bad_value\",\"message\":\"gone\"}\n");
+    reply("{\"id\":2,\"ok\":false,\"error\":\"bad_value\",\"message\":\"gone\"}\n");
     TEST_ASSERT_EQUAL(IWC_REFUSED, iwc_recording(gateway, NAME, SOON, out, &piece));
     TEST_ASSERT_EQUAL_STRING("gone", iwc_reason(gateway));
     TEST_ASSERT_NOT_EQUAL(-1, iwc_fd(gateway));

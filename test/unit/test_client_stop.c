@@ -24,23 +24,23 @@ static char folder[] = "/tmp/client_stop_XXXXXX";
 static char drive_path[64];
 static char watch_path[64];
 
-static void say(const char *text) {
+static void send_text(const char *text) {
     TEST_ASSERT_EQUAL_INT((int)strlen(text), (int)send(server, text, strlen(text), MSG_NOSIGNAL));
 }
 
 /// Returns the bytes that were received since the last call.
-static const char *hear(void) {
-    static char heard[4096];
-    const ssize_t length = recv(server, heard, sizeof heard - 1U, MSG_DONTWAIT);
-    heard[(length > 0) ? length : 0] = '\0';
-    return heard;
+static const char *receive(void) {
+    static char received[4096];
+    const ssize_t length = recv(server, received, sizeof received - 1U, MSG_DONTWAIT);
+    received[(length > 0) ? length : 0] = '\0';
+    return received;
 }
 
 static void adopt(void) {
     int pair[2];
     TEST_ASSERT_EQUAL_INT(0, socketpair(AF_UNIX, SOCK_STREAM, 0, pair));
     server = pair[1];
-    say(HELLO);
+    send_text(HELLO);
     TEST_ASSERT_EQUAL(IWC_OK, iwc_adopt(gateway, pair[0], SOON));
 }
 
@@ -78,16 +78,16 @@ static void test_ask_helpers_send_time_stop_and_key(void) {
                              "{\"id\":3,\"cmd\":\"drive\",\"key\":\"00ff\",\"left_mm_s\":1,\"right_mm_s\":2}\n"
                              "{\"id\":5,\"cmd\":\"twist\",\"key\":\"00ff\",\"v_mm_s\":5,\"yaw_mrad_s\":-6}\n"
                              "{\"id\":8,\"cmd\":\"reset\",\"stop\":17,\"t_us\":5}\n",
-                             hear());
+                             receive());
 }
 
 static void test_ask_arm_returns_the_key_of_the_lease(void) {
     adopt();
     char key[IWC_KEY_SIZE] = "before";
-    say("{\"id\":2,\"ok\":true,\"lease_ms\":200,\"key\":\"0123456789abcdef0123456789abcdef\"}\n");
+    send_text("{\"id\":2,\"ok\":true,\"lease_ms\":200,\"key\":\"0123456789abcdef0123456789abcdef\"}\n");
     TEST_ASSERT_EQUAL(IWC_OK, iwc_arm_as(gateway, &(iwc_arm_t){.takeover = true}, SOON, NULL, key));
     TEST_ASSERT_EQUAL_STRING("0123456789abcdef0123456789abcdef", key);
-    say("{\"id\":4,\"ok\":true,\"lease_ms\":200}\n"); // The reply of a microcontroller has no key.
+    send_text("{\"id\":4,\"ok\":true,\"lease_ms\":200}\n"); // The reply of a microcontroller has no key.
     TEST_ASSERT_EQUAL(IWC_OK, iwc_arm_as(gateway, &(iwc_arm_t){.takeover = true}, SOON, NULL, key));
     TEST_ASSERT_EQUAL_STRING("", key);
 }

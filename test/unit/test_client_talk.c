@@ -18,10 +18,10 @@
 
 static iwc_t *gateway;
 static int server;
-static char heard[1 << 20]; ///< Bytes that the gateway of the test has read, terminated.
+static char received[1 << 20]; ///< Bytes that the gateway of the test has read, terminated.
 static iwc_message_t message;
 
-static void say(const char *text) {
+static void send_text(const char *text) {
     size_t left = strlen(text);
     while (left > 0) {
         const ssize_t now = send(server, text, left, MSG_NOSIGNAL);
@@ -32,31 +32,31 @@ static void say(const char *text) {
 }
 
 /// Returns the bytes that were received since the last call.
-static const char *hear(void) {
+static const char *receive(void) {
     size_t used = 0;
     for (ssize_t now = 1; now > 0; used += (now > 0) ? (size_t)now : 0U) {
-        now = recv(server, heard + used, sizeof heard - 1U - used, MSG_DONTWAIT);
+        now = recv(server, received + used, sizeof received - 1U - used, MSG_DONTWAIT);
     }
-    heard[used] = '\0';
-    return heard;
+    received[used] = '\0';
+    return received;
 }
 
 static bool server_sees_the_end(void) {
     char byte;
-    (void)hear();
+    (void)receive();
     return recv(server, &byte, 1, MSG_DONTWAIT) == 0;
 }
 
 static iwc_result_t adopt_with(const char *first) {
     int pair[2];
-    const int room = 4 << 20; // Buffer of the fake gateway, which may send much before the client reads.
+    const int buffer_size = 4 << 20; // Buffer of the fake gateway, which may send much before the client reads.
     TEST_ASSERT_EQUAL_INT(0, socketpair(AF_UNIX, SOCK_STREAM, 0, pair));
     if (server >= 0) {
         (void)close(server);
     }
     server = pair[1];
-    (void)setsockopt(server, SOL_SOCKET, SO_SNDBUF, &room, sizeof room);
-    say(first);
+    (void)setsockopt(server, SOL_SOCKET, SO_SNDBUF, &buffer_size, sizeof buffer_size);
+    send_text(first);
     return iwc_adopt(gateway, pair[0], SOON);
 }
 
@@ -82,7 +82,7 @@ static void expect_event(const char *text) {
 
 TEST(test_connect_greeting_sets_the_number_and_sends_nothing) {
     TEST_ASSERT_EQUAL_INT64(7, iwc_number(gateway));
-    TEST_ASSERT_EQUAL_STRING("", hear());
+    TEST_ASSERT_EQUAL_STRING("", receive());
     TEST_ASSERT_EQUAL(IWC_TIMEOUT, iwc_next(gateway, 0, &message));
 }
 
@@ -128,20 +128,20 @@ TEST(test_connect_newer_protocol_allows_only_status_and_stop) {
     TEST_ASSERT_EQUAL(IWC_NEWER, iwc_drive(gateway, &command, 0, NULL));
     TEST_ASSERT_EQUAL(IWC_NEWER, iwc_twist(gateway, 1, 1, 0, NULL));
     TEST_ASSERT_EQUAL(IWC_NEWER, iwc_reset(gateway, 0));
-    TEST_ASSERT_EQUAL_STRING("", hear());
+    TEST_ASSERT_EQUAL_STRING("", receive());
     TEST_ASSERT_EQUAL(IWC_TIMEOUT, iwc_ask(gateway, "{\"cmd\":\"status\"}", 0, &message));
-    TEST_ASSERT_NOT_NULL(strstr(hear(), "status"));
-    say("{\"id\":12,\"ok\":true}\n");
+    TEST_ASSERT_NOT_NULL(strstr(receive(), "status"));
+    send_text("{\"id\":12,\"ok\":true}\n");
     TEST_ASSERT_EQUAL(IWC_OK, iwc_stop(gateway, SOON));
-    TEST_ASSERT_NOT_NULL(strstr(hear(), "\"cmd\":\"stop\""));
+    TEST_ASSERT_NOT_NULL(strstr(receive(), "\"cmd\":\"stop\""));
 }
 
 // ---- requests -------------------------------------------------------------------------------------------------------
 
 TEST(test_ask_returns_the_reply_with_its_id_and_queues_events) {
-    say("{\"event\":\"a\"}\n{\"id\":99,\"ok\":true}\n{\"id\":2,\"ok\":true,\"x\":5}\n{\"event\":\"b\"}\n");
+    send_text("{\"event\":\"a\"}\n{\"id\":99,\"ok\":true}\n{\"id\":2,\"ok\":true,\"x\":5}\n{\"event\":\"b\"}\n");
     TEST_ASSERT_EQUAL(IWC_OK, iwc_ask(gateway, "{\"cmd\":\"status\"}", SOON, &message));
-    TEST_ASSERT_EQUAL_STRING("{\"id\":2,\"cmd\":\"status\"}\n", hear());
+    TEST_ASSERT_EQUAL_STRING("{\"id\":2,\"cmd\":\"status\"}\n", receive());
     TEST_ASSERT_EQUAL_INT64(5, iwc_integer(&message, "x").value);
     TEST_ASSERT_FALSE(message.is_event);
     expect_event("{\"event\":\"a\"}");
@@ -153,14 +153,14 @@ TEST(test_ask_returns_the_reply_with_its_id_and_queues_events) {
 
 TEST(test_ask_late_reply_is_dropped) {
     TEST_ASSERT_EQUAL(IWC_TIMEOUT, iwc_ask(gateway, "{\"cmd\":\"why\"}", 1, &message));
-    say("{\"id\":2,\"ok\":false,\"error\":\"late\",\"message\":\"\"}\n{\"id\":4,\"ok\":true}\n");
+    send_text("{\"id\":2,\"ok\":false,\"error\":\"late\",\"message\":\"\"}\n{\"id\":4,\"ok\":true}\n");
     TEST_ASSERT_EQUAL(IWC_OK, iwc_reset(gateway, SOON));
     TEST_ASSERT_FALSE(iwc_pending(gateway));
     TEST_ASSERT_EQUAL(IWC_TIMEOUT, iwc_next(gateway, 0, &message));
 }
 
 TEST(test_ask_refusal_has_error_and_reason) {
-    say("{\"id\":2,\"ok\":false,\"error\":\"estop_pressed\",\"message\":\"release \\\"it\\\"\"}\n");
+    send_text("{\"id\":2,\"ok\":false,\"error\":\"estop_pressed\",\"message\":\"release \\\"it\\\"\"}\n");
     TEST_ASSERT_EQUAL(IWC_REFUSED, iwc_arm(gateway, "test", false, SOON, NULL));
     TEST_ASSERT_EQUAL_STRING("estop_pressed", iwc_error(gateway));
     TEST_ASSERT_EQUAL_STRING("release \"it\"", iwc_reason(gateway));
@@ -168,7 +168,7 @@ TEST(test_ask_refusal_has_error_and_reason) {
 }
 
 TEST(test_ask_refusal_without_id_ends_the_pending_request) {
-    say("{\"id\":null,\"ok\":false,\"error\":\"bad_json\",\"message\":\"\"}\n");
+    send_text("{\"id\":null,\"ok\":false,\"error\":\"bad_json\",\"message\":\"\"}\n");
     TEST_ASSERT_EQUAL(IWC_REFUSED, iwc_reset(gateway, SOON));
     TEST_ASSERT_EQUAL_STRING("bad_json", iwc_error(gateway));
 }
@@ -209,7 +209,7 @@ TEST(test_ask_invalid_request_is_not_sent) {
     TEST_ASSERT_EQUAL(IWC_INVALID, iwc_watch(gateway, 1, 101, 0));
     TEST_ASSERT_EQUAL(IWC_INVALID, iwc_arm(gateway, "a\nb", false, 0, NULL));
     TEST_ASSERT_EQUAL(IWC_INVALID, iwc_estop(gateway, "\x7f", 0));
-    TEST_ASSERT_EQUAL_STRING("", hear());
+    TEST_ASSERT_EQUAL_STRING("", receive());
 }
 
 TEST(test_ask_helpers_send_lines_of_the_protocol) {
@@ -232,15 +232,15 @@ TEST(test_ask_helpers_send_lines_of_the_protocol) {
         "{\"id\":12,\"cmd\":\"watch\",\"rate_hz\":1,\"topics\":[]}\n"
         "{\"id\":14,\"cmd\":\"reset\"}\n"
         "{\"id\":16,\"cmd\":\"estop\",\"reason\":\"stairs\"}\n",
-        hear());
+        receive());
 }
 
 TEST(test_ask_terms_and_applied_values_are_returned) {
     iwc_terms_t terms;
     iwc_applied_t applied;
     const iwc_drive_t command = {.left_mm_s = 2000, .right_mm_s = 2000};
-    say("{\"id\":2,\"ok\":true,\"lease_ms\":200,\"first_lease_ms\":1000,\"stop_budget_ms\":887,"
-        "\"stop_budget_mm\":554,\"warnings\":[\"w\"]}\n");
+    send_text("{\"id\":2,\"ok\":true,\"lease_ms\":200,\"first_lease_ms\":1000,\"stop_budget_ms\":887,"
+              "\"stop_budget_mm\":554,\"warnings\":[\"w\"]}\n");
     TEST_ASSERT_EQUAL(IWC_OK, iwc_arm(gateway, NULL, false, SOON, &terms));
     TEST_ASSERT_EQUAL_INT32(200, terms.lease_ms);
     TEST_ASSERT_EQUAL_INT32(1000, terms.first_lease_ms);
@@ -250,8 +250,8 @@ TEST(test_ask_terms_and_applied_values_are_returned) {
     TEST_ASSERT_TRUE(iwc_reply(gateway, &message));
     TEST_ASSERT_EQUAL_STRING_LEN("[\"w\"]", iwc_json(&message, "warnings", &length), 5);
     TEST_ASSERT_EQUAL_INT64(2, message.id);
-    say("{\"id\":4,\"ok\":true,\"left_mm_s\":1000,\"right_mm_s\":-999,\"left_mA\":2000,\"right_mA\":1999,"
-        "\"limited\":true}\n");
+    send_text("{\"id\":4,\"ok\":true,\"left_mm_s\":1000,\"right_mm_s\":-999,\"left_mA\":2000,\"right_mA\":1999,"
+              "\"limited\":true}\n");
     TEST_ASSERT_EQUAL(IWC_OK, iwc_drive(gateway, &command, SOON, &applied));
     TEST_ASSERT_TRUE(iwc_reply(gateway, &message));
     TEST_ASSERT_EQUAL_INT32(1000, applied.left_mm_s);
@@ -271,7 +271,7 @@ TEST(test_line_in_single_bytes_is_one_message) {
             TEST_ASSERT_EQUAL(IWC_TIMEOUT, iwc_next(gateway, 0, &message));
         }
         byte[0] = text[i];
-        say(byte);
+        send_text(byte);
         if (text[i] == '\n') {
             expect_event((i < 20) ? "{\"event\":\"a\"}" : "{\"event\":\"b\"}");
         }
@@ -284,7 +284,7 @@ static void say_long(size_t length) {
     const int n = snprintf(text, sizeof text, "{\"event\":\"");
     memset(text + n, 'e', sizeof text - (size_t)n);
     memcpy(text + length - 2U, "\"}\n", 4);
-    say(text);
+    send_text(text);
 }
 
 TEST(test_line_of_maximum_length_is_accepted_repeatedly) {
@@ -296,7 +296,7 @@ TEST(test_line_of_maximum_length_is_accepted_repeatedly) {
 }
 
 TEST(test_line_longer_than_the_maximum_ends_the_connection) {
-    say("{\"event\":\"a\"}\n");
+    send_text("{\"event\":\"a\"}\n");
     say_long(IWC_LINE_MAX + 1U);
     expect_event("{\"event\":\"a\"}");
     TEST_ASSERT_EQUAL(IWC_GARBLED, iwc_next(gateway, SOON, &message));
@@ -305,7 +305,7 @@ TEST(test_line_longer_than_the_maximum_ends_the_connection) {
 
 TEST(test_line_without_newline_ends_the_connection) {
     for (unsigned i = 0; i <= IWC_LINE_MAX / 64U; i++) {
-        say("{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{");
+        send_text("{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{");
     }
     TEST_ASSERT_EQUAL(IWC_GARBLED, iwc_next(gateway, SOON, &message));
 }
@@ -321,8 +321,8 @@ TEST(test_line_of_garbage_ends_the_connection_after_good_ones) {
                                       "{\"event\":\"a\",\"b\":{\"c\":1}\n"};
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
         TEST_ASSERT_EQUAL(IWC_OK, adopt_with(HELLO));
-        say("{\"event\":\"good\"}\n");
-        say(bad[i]);
+        send_text("{\"event\":\"good\"}\n");
+        send_text(bad[i]);
         expect_event("{\"event\":\"good\"}");
         TEST_ASSERT_EQUAL_MESSAGE(IWC_GARBLED, iwc_next(gateway, 0, &message), bad[i]);
         TEST_ASSERT_EQUAL(IWC_GARBLED, iwc_next(gateway, 0, &message));
@@ -332,7 +332,7 @@ TEST(test_line_of_garbage_ends_the_connection_after_good_ones) {
 
 TEST(test_line_cut_by_end_of_gateway_is_no_message) {
     const iwc_drive_t command = {.left_mm_s = 100};
-    say("{\"event\":\"a\"}\n{\"event\":\"b\"}");
+    send_text("{\"event\":\"a\"}\n{\"event\":\"b\"}");
     (void)shutdown(server, SHUT_RDWR);
     expect_event("{\"event\":\"a\"}");
     for (int i = 0; i < 3; i++) {
@@ -341,7 +341,7 @@ TEST(test_line_cut_by_end_of_gateway_is_no_message) {
     }
     TEST_ASSERT_EQUAL_INT(-1, iwc_fd(gateway));
     TEST_ASSERT_EQUAL(IWC_OK, adopt_with(HELLO));
-    TEST_ASSERT_EQUAL_STRING("", hear()); // After the new connection nothing is armed or driven automatically.
+    TEST_ASSERT_EQUAL_STRING("", receive()); // After the new connection nothing is armed or driven automatically.
     TEST_ASSERT_EQUAL(IWC_TIMEOUT, iwc_next(gateway, 0, &message));
 }
 
@@ -349,44 +349,45 @@ TEST(test_line_cut_by_end_of_gateway_is_no_message) {
 
 TEST(test_flood_of_unread_events_retains_newest_and_count) {
     char text[300];
-    uint64_t told = 0;
+    uint64_t total = 0;
     int64_t last = -1;
     for (int i = 0; i < 5000; i++) {
         (void)snprintf(text, sizeof text, "{\"event\":\"%s\",\"number\":%d,\"pad\":\"%200s\"}\n",
                        (i % 10 == 0) ? "stop" : "state", i, "");
-        say(text);
+        send_text(text);
         if (i % 500 == 499) {
             TEST_ASSERT_EQUAL(IWC_TIMEOUT, iwc_ask(gateway, "{\"cmd\":\"status\"}", 0, NULL));
         }
     }
     while (iwc_next(gateway, 0, &message) == IWC_OK) {
-        told += message.skipped + 1U;
+        total += message.skipped + 1U;
         TEST_ASSERT_GREATER_THAN(last, iwc_integer(&message, "number").value);
         last = iwc_integer(&message, "number").value;
     }
     TEST_ASSERT_EQUAL_INT64(4999, last);
-    TEST_ASSERT_EQUAL_UINT64(5000, told);
+    TEST_ASSERT_EQUAL_UINT64(5000, total);
 }
 
 TEST(test_flood_of_different_events_drops_the_oldest) {
     char text[100];
-    uint64_t told = 0;
+    uint64_t total = 0;
     int64_t last = -1;
     for (int i = 0; i < 300; i++) {
         (void)snprintf(text, sizeof text, "{\"event\":\"frame\",\"id\":%d,\"kind\":\"received\"}\n", i);
-        say(text);
+        send_text(text);
     }
     TEST_ASSERT_EQUAL(IWC_OK, iwc_latest(gateway));
     while (iwc_next(gateway, 0, &message) == IWC_OK) {
-        told += message.skipped + 1U;
+        total += message.skipped + 1U;
         last = iwc_integer(&message, "id").value;
     }
     TEST_ASSERT_EQUAL_INT64(299, last);
-    TEST_ASSERT_EQUAL_UINT64(300, told);
+    TEST_ASSERT_EQUAL_UINT64(300, total);
 }
 
 TEST(test_latest_retains_one_message_of_each_kind_in_order) {
-    say("{\"event\":\"fault\",\"cause\":\"overspeed\"}\n{\"event\":\"state\",\"n\":1}\n{\"id\":1,\"ok\":true}\n"
+    send_text(
+        "{\"event\":\"fault\",\"cause\":\"overspeed\"}\n{\"event\":\"state\",\"n\":1}\n{\"id\":1,\"ok\":true}\n"
         "{\"event\":\"fault\",\"cause\":\"bus_down\"}\n{\"event\":\"lost\",\"count\":10}\n{\"event\":\"state\",\"n\":2}"
         "\n"
         "{\"event\":\"frame\",\"id\":256,\"kind\":\"echo\"}\n{\"event\":\"frame\",\"id\":256,\"kind\":\"received\"}\n"
@@ -407,12 +408,12 @@ TEST(test_latest_retains_one_message_of_each_kind_in_order) {
 }
 
 TEST(test_latest_does_not_change_the_current_message) {
-    say("{\"event\":\"a\"}\n");
+    send_text("{\"event\":\"a\"}\n");
     expect_event("{\"event\":\"a\"}");
-    say("{\"event\":\"b\"}\n{\"event\":\"b\"}\n{\"event\":");
+    send_text("{\"event\":\"b\"}\n{\"event\":\"b\"}\n{\"event\":");
     TEST_ASSERT_EQUAL(IWC_OK, iwc_latest(gateway));
     TEST_ASSERT_EQUAL_STRING("{\"event\":\"a\"}", message.text);
-    say("\"c\"}\n");
+    send_text("\"c\"}\n");
     expect_event("{\"event\":\"b\"}");
     TEST_ASSERT_EQUAL_UINT64(1, message.skipped);
     expect_event("{\"event\":\"c\"}");
@@ -423,12 +424,12 @@ TEST(test_latest_does_not_change_the_current_message) {
 TEST(test_drive_is_sent_once_and_never_repeated) {
     const iwc_drive_t command = {.left_mm_s = 300, .right_mm_s = 300};
     TEST_ASSERT_EQUAL(IWC_OK, iwc_drive(gateway, &command, 0, NULL));
-    TEST_ASSERT_EQUAL_STRING("{\"id\":1,\"cmd\":\"drive\",\"left_mm_s\":300,\"right_mm_s\":300}\n", hear());
+    TEST_ASSERT_EQUAL_STRING("{\"id\":1,\"cmd\":\"drive\",\"left_mm_s\":300,\"right_mm_s\":300}\n", receive());
     for (int i = 0; i < 20; i++) {
         (void)iwc_next(gateway, 1, &message);
         (void)iwc_latest(gateway);
     }
-    TEST_ASSERT_EQUAL_STRING("", hear());
+    TEST_ASSERT_EQUAL_STRING("", receive());
 }
 
 TEST(test_drive_without_replies_is_full_and_dropped) {
@@ -438,22 +439,22 @@ TEST(test_drive_without_replies_is_full_and_dropped) {
     }
     TEST_ASSERT_EQUAL(IWC_FULL, iwc_drive(gateway, &command, 0, NULL));
     TEST_ASSERT_EQUAL(IWC_FULL, iwc_twist(gateway, 1, 1, 0, NULL));
-    (void)hear();
-    say("{\"id\":1,\"ok\":true}\n");
-    TEST_ASSERT_EQUAL_STRING("", hear());
+    (void)receive();
+    send_text("{\"id\":1,\"ok\":true}\n");
+    TEST_ASSERT_EQUAL_STRING("", receive());
     TEST_ASSERT_EQUAL(IWC_OK,
                       iwc_drive(gateway, &command, 0, NULL)); // A reply has arrived; the client need not read it first.
     TEST_ASSERT_EQUAL(IWC_FULL, iwc_drive(gateway, &command, 0, NULL));
     TEST_ASSERT_EQUAL(IWC_TIMEOUT,
                       iwc_ask(gateway, "{\"cmd\":\"status\"}", 0, NULL)); // All other requests are still sent.
-    TEST_ASSERT_NOT_NULL(strstr(hear(), "status"));
+    TEST_ASSERT_NOT_NULL(strstr(receive(), "status"));
 }
 
 /// Fills the socket to the gateway.
 static void stuff(void) {
-    const int room = 1;
+    const int buffer_size = 1;
     int64_t id = 0;
-    TEST_ASSERT_EQUAL_INT(0, setsockopt(iwc_fd(gateway), SOL_SOCKET, SO_SNDBUF, &room, sizeof room));
+    TEST_ASSERT_EQUAL_INT(0, setsockopt(iwc_fd(gateway), SOL_SOCKET, SO_SNDBUF, &buffer_size, sizeof buffer_size));
     for (int i = 0; i < 10000; i++) {
         const iwc_result_t result = iwc_send(gateway, "{\"cmd\":\"hello\"}", 0, &id);
         if (result == IWC_FULL) {
@@ -470,12 +471,12 @@ TEST(test_drive_on_full_socket_is_never_sent_later) {
     for (unsigned i = 0; i <= IWC_DRIVES_MAX; i++) {
         TEST_ASSERT_EQUAL(IWC_FULL, iwc_drive(gateway, &command, (i == 0) ? 2 : 0, NULL));
     }
-    (void)hear();
-    TEST_ASSERT_NULL(strstr(heard, "drive"));
+    (void)receive();
+    TEST_ASSERT_NULL(strstr(received, "drive"));
     TEST_ASSERT_EQUAL(IWC_TIMEOUT, iwc_next(gateway, 1, &message));
     TEST_ASSERT_EQUAL(IWC_TIMEOUT, iwc_ask(gateway, "{\"cmd\":\"status\"}", 1, NULL));
-    TEST_ASSERT_NULL(strstr(hear(), "drive"));
-    TEST_ASSERT_NOT_NULL(strstr(heard, "status"));
+    TEST_ASSERT_NULL(strstr(receive(), "drive"));
+    TEST_ASSERT_NOT_NULL(strstr(received, "status"));
     TEST_ASSERT_EQUAL(IWC_OK, iwc_drive(gateway, &command, 0, NULL)); // An unsent drive does not wait for a reply.
 }
 
@@ -487,8 +488,8 @@ TEST(test_drive_sent_in_part_ends_the_connection) {
     stuff();
     TEST_ASSERT_EQUAL(sizeof line - 1U, recv(server, line, sizeof line - 1U, 0)); // Makes space for a part.
     TEST_ASSERT_EQUAL(IWC_CLOSED, iwc_send(gateway, text, 0, &id));
-    TEST_ASSERT_NOT_NULL(strstr(hear(), "drive"));
-    TEST_ASSERT_NULL(strchr(strstr(heard, "drive"), '\n'));
+    TEST_ASSERT_NOT_NULL(strstr(receive(), "drive"));
+    TEST_ASSERT_NULL(strchr(strstr(received, "drive"), '\n'));
     TEST_ASSERT_TRUE(server_sees_the_end());
 }
 
@@ -504,7 +505,7 @@ TEST(test_stop_without_reply_ends_the_connection) {
 
 TEST(test_drive_to_a_closed_gateway_raises_no_signal) {
     const iwc_drive_t command = {.left_mm_s = 300};
-    say("{\"event\":\"stop\"}\n");
+    send_text("{\"event\":\"stop\"}\n");
     (void)shutdown(server, SHUT_RDWR);
     TEST_ASSERT_EQUAL(IWC_CLOSED, iwc_drive(gateway, &command, 0, NULL));
     expect_event("{\"event\":\"stop\"}"); // The last event of the gateway is not lost.
@@ -531,7 +532,7 @@ TEST(test_fork_child_neither_drives_nor_ends_the_connection) {
     }
     TEST_ASSERT_EQUAL_INT(child, waitpid(child, &status, 0));
     TEST_ASSERT_EQUAL_INT(0, status);
-    TEST_ASSERT_EQUAL_STRING("", hear());
+    TEST_ASSERT_EQUAL_STRING("", receive());
     TEST_ASSERT_FALSE(server_sees_the_end());
     TEST_ASSERT_EQUAL(IWC_OK, iwc_drive(gateway, &command, 0, NULL));
 }

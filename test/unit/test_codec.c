@@ -110,11 +110,11 @@ TEST(test_decode_shorter_frame_is_refused_output_unchanged) {
         const golden_vector_t *golden = &golden_vectors[v];
         for (uint8_t dlc = 0; dlc < golden->frame.dlc; dlc++) {
             iw_can_frame_t frame = golden->frame;
-            iw_codec_wheel_t told[IW_SIDES];
-            memset(told, POISON, sizeof told);
+            iw_codec_wheel_t decoded[IW_SIDES];
+            memset(decoded, POISON, sizeof decoded);
             frame.dlc = dlc;
-            TEST_ASSERT_EQUAL_INT_MESSAGE(IW_CODEC_BAD_LENGTH, iw_codec_decode(&frame, told), golden->name);
-            assert_untouched(told, sizeof told, golden->name);
+            TEST_ASSERT_EQUAL_INT_MESSAGE(IW_CODEC_BAD_LENGTH, iw_codec_decode(&frame, decoded), golden->name);
+            assert_untouched(decoded, sizeof decoded, golden->name);
         }
     }
 }
@@ -133,23 +133,23 @@ static void place_of(iw_codec_kind_t kind, size_t *out_at, size_t *out_size) {
 TEST(test_decode_writes_only_the_values_of_the_frame) {
     for (size_t v = 0; v < GOLDEN_VECTORS; v++) {
         const golden_vector_t *golden = &golden_vectors[v];
-        iw_codec_wheel_t told[IW_SIDES];
+        iw_codec_wheel_t decoded[IW_SIDES];
         size_t at;
         size_t size;
-        memset(told, POISON, sizeof told);
-        TEST_ASSERT_EQUAL_INT_MESSAGE(golden->message.kind, iw_codec_decode(&golden->frame, told), golden->name);
+        memset(decoded, POISON, sizeof decoded);
+        TEST_ASSERT_EQUAL_INT_MESSAGE(golden->message.kind, iw_codec_decode(&golden->frame, decoded), golden->name);
         place_of(golden->message.kind, &at, &size);
-        memset((uint8_t *)&told[golden->message.side] + at, POISON, size);
-        assert_untouched(told, sizeof told, golden->name);
+        memset((uint8_t *)&decoded[golden->message.side] + at, POISON, size);
+        assert_untouched(decoded, sizeof decoded, golden->name);
     }
 }
 
 TEST(test_codec_find_agrees_with_decode_for_every_id) {
     for (uint32_t id = 0; id <= IW_CAN_ID_MASK; id++) {
         const iw_codec_row_t *row = iw_codec_find(id);
-        iw_codec_wheel_t told[IW_SIDES];
+        iw_codec_wheel_t decoded[IW_SIDES];
         const iw_can_frame_t frame = {.id = id, .dlc = IW_CAN_DATA_MAX};
-        const iw_codec_kind_t kind = iw_codec_decode(&frame, told);
+        const iw_codec_kind_t kind = iw_codec_decode(&frame, decoded);
         TEST_ASSERT_EQUAL_INT(kind == IW_CODEC_UNKNOWN, row == NULL);
         if (row != NULL) {
             TEST_ASSERT_EQUAL_UINT32(id, row->id);
@@ -163,14 +163,14 @@ TEST(test_codec_row_length_agrees_with_decode_and_encode) {
     for (size_t i = 0; i < IW_CODEC_ROWS; i++) {
         const iw_codec_row_t *row = &iw_codec_rows[i];
         const iw_codec_wheel_t zero = {.pose = {0, 0, 0, 0}};
-        iw_codec_wheel_t told[IW_SIDES];
+        iw_codec_wheel_t decoded[IW_SIDES];
         iw_can_frame_t frame;
         TEST_ASSERT_EQUAL_INT(IW_OK, iw_codec_encode((iw_codec_kind_t)row->kind, (iw_side_t)row->side, &zero, &frame));
         TEST_ASSERT_EQUAL_UINT8(row->length, frame.dlc);
         TEST_ASSERT_EQUAL_UINT8(row->length, iw_codec_length((iw_codec_kind_t)row->kind));
-        TEST_ASSERT_EQUAL_INT(row->kind, iw_codec_decode(&frame, told));
+        TEST_ASSERT_EQUAL_INT(row->kind, iw_codec_decode(&frame, decoded));
         frame.dlc--;
-        TEST_ASSERT_EQUAL_INT(IW_CODEC_BAD_LENGTH, iw_codec_decode(&frame, told));
+        TEST_ASSERT_EQUAL_INT(IW_CODEC_BAD_LENGTH, iw_codec_decode(&frame, decoded));
     }
 }
 

@@ -249,19 +249,19 @@ static iw_codec_kind_t expected_kind(uint32_t number, uint32_t format, uint8_t d
     return (dlc < layout->dlc || dlc > IW_CAN_DATA_MAX) ? IW_CODEC_BAD_LENGTH : layout->kind;
 }
 
-static bool is_poison(const iw_codec_wheel_t told[IW_SIDES]) {
+static bool is_poison(const iw_codec_wheel_t decoded[IW_SIDES]) {
     iw_codec_wheel_t poison[IW_SIDES];
     memset(poison, POISON, sizeof poison);
-    return memcmp(told, poison, sizeof poison) == 0;
+    return memcmp(decoded, poison, sizeof poison) == 0;
 }
 
 static void check_kind(const iw_can_frame_t *frame, iw_codec_kind_t expected) {
-    iw_codec_wheel_t told[IW_SIDES];
-    memset(told, POISON, sizeof told);
-    if (iw_codec_decode(frame, told) != expected) {
+    iw_codec_wheel_t decoded[IW_SIDES];
+    memset(decoded, POISON, sizeof decoded);
+    if (iw_codec_decode(frame, decoded) != expected) {
         fail_for(frame, "wrong kind");
     }
-    if (is_poison(told) != (expected >= IW_CODEC_KINDS)) {
+    if (is_poison(decoded) != (expected >= IW_CODEC_KINDS)) {
         fail_for(frame, "output must be written on success only");
     }
 }

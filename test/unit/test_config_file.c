@@ -206,7 +206,7 @@ TEST(test_parse_range_ends_are_accepted_and_beyond_refused) {
         {"drive", "hold_max_s", 10, 600},
     };
     char text[128];
-    char cure[64];
+    char range[64];
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
         const long inside[] = {rows[i].min, rows[i].max};
         const long outside[] = {rows[i].min - 1, rows[i].max + 1, rows[i].max + 65536, 4294967296L + rows[i].min};
@@ -214,10 +214,10 @@ TEST(test_parse_range_ends_are_accepted_and_beyond_refused) {
             snprintf(text, sizeof text, "[%s]\n%s = %ld\n", rows[i].section, rows[i].key, inside[j]);
             accepted(text);
         }
-        snprintf(cure, sizeof cure, "%ld..%ld", rows[i].min, rows[i].max);
+        snprintf(range, sizeof range, "%ld..%ld", rows[i].min, rows[i].max);
         for (size_t j = 0; j < 4; j++) {
             snprintf(text, sizeof text, "[%s]\n%s = %ld\n", rows[i].section, rows[i].key, outside[j]);
-            refused(text, "iw.conf:2: ", cure);
+            refused(text, "iw.conf:2: ", range);
         }
     }
 }

@@ -70,7 +70,7 @@ TEST(test_parse_value_against_a_rule_is_refused_with_the_rule) {
     }
 }
 
-/// Without a value rest_rpm follows from radius and gear, in any order of the keys. A given value is checked against
+/// Without a value rest_rpm follows from radius and gear, in any order of the keys. A configured value is checked against
 /// them.
 TEST(test_parse_rest_rpm_depends_on_radius_and_gear) {
     accepted("[limits]\nrest_ms = 300\n[wheels]\nradius_mm = 60\n");

@@ -106,7 +106,7 @@ static uint32_t earlier(uint32_t a, uint32_t b) {
     return (a == 0) ? b : (b == 0) ? a : (a < b) ? a : b;
 }
 
-/// Returns true if the account and the model give the same results to a caller.
+/// Returns true if the account and the model return the same results to a caller.
 static bool agrees(const model_t *models, uint32_t now) {
     for (int zero = 0; zero <= 1; zero++) {
         const uint32_t left = model_may_send(&models[IW_LEFT], zero != 0) ? IW_SIDES_LEFT : IW_SIDES_NONE;

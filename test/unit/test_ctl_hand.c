@@ -10,23 +10,23 @@
 #define LOOK_MS 20
 
 static hand_t hand;
-static hand_look_t look;
+static hand_look_t view;
 static int64_t now_us;
 
 void setUp(void) {
-    look = (hand_look_t){.heard = true};
+    view = (hand_look_t){.heard = true};
     now_us = 5000000;
-    hand_begin(&hand, &look, now_us);
+    hand_begin(&hand, &view, now_us);
 }
 
 /// The wheels turn for this time, the left one backwards; then an answer arrives.
 static void turn_until_an_answer(int ms) {
     now_us += ms * INT64_C(1000);
-    look.rpm[IW_LEFT] = -RPM;
-    look.rpm[IW_RIGHT] = RPM;
-    look.ticks[IW_LEFT] -= RPM * ms / 1000;
-    look.ticks[IW_RIGHT] += RPM * ms / 1000;
-    hand_add(&hand, &look, now_us);
+    view.rpm[IW_LEFT] = -RPM;
+    view.rpm[IW_RIGHT] = RPM;
+    view.ticks[IW_LEFT] -= RPM * ms / 1000;
+    view.ticks[IW_RIGHT] += RPM * ms / 1000;
+    hand_add(&hand, &view, now_us);
 }
 
 static void turn(int ms) {
@@ -49,9 +49,9 @@ TEST(test_hand_adds_the_ticks_of_both_wheels) {
 TEST(test_hand_stall_of_the_program_loses_no_ticks) {
     turn(1000);
     turn_until_an_answer(HAND_OFFLINE_US / 1000 + 100);
-    look.heard = false; // Frames that waited meanwhile are not read yet.
+    view.heard = false; // Frames that waited meanwhile are not read yet.
     turn_until_an_answer(LOOK_MS);
-    look.heard = true;
+    view.heard = true;
     turn(1000);
     turn_until_an_answer(HAND_UNSEEN_US / 1000);
     TEST_ASSERT_TRUE(hand_is_complete(&hand));
@@ -61,13 +61,13 @@ TEST(test_hand_stall_of_the_program_loses_no_ticks) {
 TEST(test_hand_stall_of_the_program_does_not_change_the_rpm) {
     turn(2000);
     now_us += 1000000; // The wheel turned, and is at standstill when the next answer arrives.
-    look.ticks[IW_RIGHT] += RPM;
-    look.rpm[IW_RIGHT] = 0;
-    hand_add(&hand, &look, now_us);
+    view.ticks[IW_RIGHT] += RPM;
+    view.rpm[IW_RIGHT] = 0;
+    hand_add(&hand, &view, now_us);
     TEST_ASSERT_INT_WITHIN(1, 100, lround(100.0 * hand_rpm_share(&hand, IW_RIGHT)));
-    look.ticks[IW_RIGHT] += 2 * RPM;
+    view.ticks[IW_RIGHT] += 2 * RPM;
     now_us += HAND_STALL_US + 1;
-    hand_add(&hand, &look, now_us);
+    hand_add(&hand, &view, now_us);
     TEST_ASSERT_EQUAL_INT(0, lround(100.0 * hand_rpm_share(&hand, IW_RIGHT))); // 200 of 500 ticks are too few.
 }
 
@@ -77,23 +77,23 @@ TEST(test_hand_without_ticks_shows_no_rpm) {
 
 TEST(test_hand_offline_wheel_is_a_gap) {
     turn(100);
-    look.heard = false;
+    view.heard = false;
     turn(HAND_OFFLINE_US / 1000);
     TEST_ASSERT_TRUE(hand_is_complete(&hand));
-    look.heard = true;
+    view.heard = true;
     turn(100); // Separate short gaps do not add up.
-    look.heard = false;
+    view.heard = false;
     turn(HAND_OFFLINE_US / 1000);
     TEST_ASSERT_TRUE(hand_is_complete(&hand));
     turn(LOOK_MS);
     TEST_ASSERT_EQUAL_INT(HAND_OFFLINE, hand.gap);
-    look.heard = true;
+    view.heard = true;
     turn(1000);
     TEST_ASSERT_FALSE(hand_is_complete(&hand));
 }
 
 TEST(test_hand_stall_with_offline_wheel_counts_as_short_gap) {
-    look.heard = false;
+    view.heard = false;
     turn_until_an_answer(1000);
     turn_until_an_answer(1000);
     TEST_ASSERT_EQUAL_INT(HAND_COMPLETE, hand.gap);
@@ -103,7 +103,7 @@ TEST(test_hand_stall_with_offline_wheel_counts_as_short_gap) {
 
 TEST(test_hand_restarted_wheel_is_a_gap) {
     turn(100);
-    look.reboots = 1;
+    view.reboots = 1;
     turn(LOOK_MS);
     turn_until_an_answer(HAND_UNSEEN_US / 1000 + 1); // The first reason stays.
     TEST_ASSERT_EQUAL_INT(HAND_RESTARTED, hand.gap);
@@ -118,7 +118,7 @@ TEST(test_hand_without_answers_for_too_long_is_a_gap) {
 }
 
 TEST(test_hand_begin_with_offline_wheel_is_a_gap) {
-    look.heard = false;
-    hand_begin(&hand, &look, now_us);
+    view.heard = false;
+    hand_begin(&hand, &view, now_us);
     TEST_ASSERT_EQUAL_INT(HAND_OFFLINE, hand.gap);
 }

@@ -15,7 +15,7 @@ static learn_drives_t drives;
 static iw_config_t config;
 static int64_t now_us;
 
-static void hear(const message_t *message) {
+static void feed(const message_t *message) {
     iw_can_frame_t frame;
     TEST_ASSERT_EQUAL_INT(IW_OK, message_encode(message, &frame));
     const candump_t recorded = candump_from_core(&frame, now_us, "can0");
@@ -36,19 +36,19 @@ static void setpoint(iw_side_t side, int16_t speed_mm_s, int16_t current_mA, can
 }
 
 static void speed(iw_side_t side, int16_t rpm) {
-    hear(&(message_t){.kind = IW_CODEC_SPEED, .side = side, .as = {.speed = {.speed_rpm = rpm}}});
+    feed(&(message_t){.kind = IW_CODEC_SPEED, .side = side, .as = {.speed = {.speed_rpm = rpm}}});
 }
 
 static void ticks(iw_side_t side, int32_t odometry) {
-    hear(&(message_t){.kind = IW_CODEC_STATUS, .side = side, .as = {.status = {.odometry_ticks = odometry}}});
+    feed(&(message_t){.kind = IW_CODEC_STATUS, .side = side, .as = {.status = {.odometry_ticks = odometry}}});
 }
 
 static void force(iw_side_t side, int16_t raw) {
-    hear(&(message_t){.kind = IW_CODEC_FORCE, .side = side, .as = {.force = {.force_raw = raw}}});
+    feed(&(message_t){.kind = IW_CODEC_FORCE, .side = side, .as = {.force = {.force_raw = raw}}});
 }
 
 static void pose(int16_t x_mm) {
-    hear(&(message_t){.kind = IW_CODEC_POSE, .side = IW_RIGHT, .as = {.pose = {.x_mm = x_mm}}});
+    feed(&(message_t){.kind = IW_CODEC_POSE, .side = IW_RIGHT, .as = {.pose = {.x_mm = x_mm}}});
 }
 
 void setUp(void) {
@@ -314,15 +314,15 @@ TEST(test_learn_compares_nothing_while_a_wheel_is_offline) {
 
 /// Both wheels are 10 % slow: straight ahead the errors cancel, unless one wheel counts in the other direction.
 TEST(test_learn_mirrored_wheel_is_compared_by_its_mount_sign) {
-    const int16_t told[IW_SIDES] = {1005, -1005};
+    const int16_t speeds[IW_SIDES] = {1005, -1005};
     const int16_t slow[IW_SIDES] = {45, -45};
     config.invert[IW_RIGHT] = true;
     learn_drives_init(&drives, &config);
-    drive_both(2000, told, slow);
+    drive_both(2000, speeds, slow);
     TEST_ASSERT_LESS_THAN_UINT32(2, drives.largest_mm);
     config.invert[IW_RIGHT] = false;
     learn_drives_init(&drives, &config);
-    drive_both(2000, told, slow);
+    drive_both(2000, speeds, slow);
     TEST_ASSERT_GREATER_THAN_UINT32(40, drives.largest_mm);
 }
 
@@ -395,7 +395,7 @@ TEST(test_learn_lag_above_the_assumption_is_marked) {
     assert_lag(120.0, 0.0);
     TEST_ASSERT_EQUAL_CHAR('-', lag_found(IW_LEFT, "wheel_lag")->mark);
     TEST_ASSERT_EQUAL_CHAR('?', lag_found(IW_RIGHT, "wheel_lag")->mark);
-    TEST_ASSERT_NULL(lag_found(LEARN_BOTH, "wheel_lag_ms")); // One wheel alone gives no common value.
+    TEST_ASSERT_NULL(lag_found(LEARN_BOTH, "wheel_lag_ms")); // One wheel alone has no common value.
     drives.lag[IW_RIGHT] = drives.lag[IW_LEFT];
     TEST_ASSERT_EQUAL_INT32(120, (atoi(lag_found(LEARN_BOTH, "wheel_lag_ms")->value) + 5) / 10 * 10);
 }

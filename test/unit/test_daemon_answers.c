@@ -13,10 +13,10 @@ static uint64_t noted_so_far(void) {
     return blackbox_ring_written(daemon_rig.daemon->box.ring);
 }
 
-static blackbox_entry_t *found; ///< Result of the last `look`.
+static blackbox_entry_t *found; ///< Result of the last `find_entries`.
 
 /// Copies the entries of the black box from `*at` on. Sets `*at` to the first of them. Returns their number.
-static size_t look(uint64_t *at) {
+static size_t find_entries(uint64_t *at) {
     const blackbox_ring_t *ring = daemon_rig.daemon->box.ring;
     size_t count = 0;
     found = (blackbox_entry_t *)realloc(found, blackbox_ring_most(ring) * sizeof *found);
@@ -28,7 +28,7 @@ static size_t look(uint64_t *at) {
 /// Returns the next entry of this kind in the black box, from `*at` on.
 static blackbox_entry_t noted(blackbox_kind_t kind, uint64_t *at) {
     uint64_t first = *at;
-    const size_t count = look(&first);
+    const size_t count = find_entries(&first);
     for (size_t i = 0; i < count; i++) {
         if (found[i].kind == kind) {
             *at = first + i + 1U;
@@ -89,16 +89,16 @@ TEST(test_tare_of_one_wheel_replies_with_its_offset) {
     static const char *const sides[] = {"left", "right"};
     iw_force_t *force = daemon_rig.daemon->wheels.core.force;
     char line[64];
-    char told[32];
+    char expected[32];
     for (unsigned side = 0; side < IW_SIDES; side++) {
         daemon_rig_run(3000);
         memset(daemon_rig.daemon->assumptions.tare, 0, sizeof daemon_rig.daemon->assumptions.tare);
         force[1U - side].offset_mN = 7777;
         (void)snprintf(line, sizeof line, "{\"cmd\":\"tare\",\"side\":\"%s\"}", sides[side]);
         const char *reply = daemon_rig_ask(client, line);
-        (void)snprintf(told, sizeof told, "\"offset_mN\":%d,", (int)force[side].offset_mN);
+        (void)snprintf(expected, sizeof expected, "\"offset_mN\":%d,", (int)force[side].offset_mN);
         TEST_ASSERT_TRUE(force[side].offset_mN != 7777);
-        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, told), reply);
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, expected), reply);
         TEST_ASSERT_NULL_MESSAGE(strstr(reply, "\"samples\":0,"), reply);
     }
 }
@@ -182,7 +182,7 @@ TEST(test_blackbox_frames_have_the_time_of_their_step) {
         const iw_time_us_t begin_us = daemon_rig.now_us;
         uint64_t at = noted_so_far();
         daemon_rig_run(1);
-        const size_t count = look(&at);
+        const size_t count = find_entries(&at);
         for (size_t i = 0; i < count; i++) {
             TEST_ASSERT_TRUE(found[i].at_us >= begin_us);
             frames += (found[i].kind == BLACKBOX_FRAME) ? 1U : 0U;
@@ -255,7 +255,7 @@ TEST(test_bus_facts_are_recorded_once_per_change) {
     TEST_ASSERT_EQUAL_UINT32(warnings, daemon_rig.daemon->wheels.warnings);
     (void)noted(BLACKBOX_FACTS, &at);
     unsigned facts = 0;
-    const size_t count = look(&at);
+    const size_t count = find_entries(&at);
     for (size_t i = 0; i < count; i++) {
         facts += (found[i].kind == BLACKBOX_FACTS) ? 1U : 0U;
     }
@@ -272,9 +272,9 @@ TEST(test_purge_by_the_port_is_logged_once) {
         daemon_rig_run(100);
     }
     for (unsigned purge = IWL_LINK_PURGE_DONE; purge <= IWL_LINK_PURGE_FAILED; purge++) {
-        const char *told = strstr(daemon_rig_log(), words[purge]);
-        TEST_ASSERT_NOT_NULL_MESSAGE(told, words[purge]);
-        TEST_ASSERT_NULL(strstr(told + 1, words[purge]));
+        const char *expected = strstr(daemon_rig_log(), words[purge]);
+        TEST_ASSERT_NOT_NULL_MESSAGE(expected, words[purge]);
+        TEST_ASSERT_NULL(strstr(expected + 1, words[purge]));
     }
 }
 
@@ -293,13 +293,13 @@ TEST(test_warnings_contain_left_setpoint_and_wrong_bitrate_once) {
 }
 
 /// Checks the contacts in the status and in the log.
-static void expect_contacts(int first, int second, const char *status, const char *told) {
+static void expect_contacts(int first, int second, const char *status, const char *expected) {
     daemon_rig.estop = first;
     daemon_rig.estop2 = second;
     daemon_rig_run(20);
     const char *reply = daemon_rig_ask(client, "{\"cmd\":\"status\"}");
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, status), reply);
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(daemon_rig_log(), told), daemon_rig_log());
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(daemon_rig_log(), expected), daemon_rig_log());
 }
 
 TEST(test_estop_two_contacts_status_names_pressed_and_disagreeing) {
@@ -332,7 +332,7 @@ TEST(test_refusal_names_the_affected_contact) {
     static const struct {
         int first;
         int second;
-        const char *said;
+        const char *text;
     } cases[] = {{0, -1, "the e-stop SECOND cannot be read"}, {1, -1, "the e-stop SECOND cannot be read"},
                  {-1, 0, "the e-stop FIRST cannot be read"},  {-1, 1, "the e-stop FIRST cannot be read"},
                  {-1, -1, "the e-stop FIRST cannot be read"}, {0, 1, "the e-stop SECOND is pressed"},
@@ -347,7 +347,7 @@ TEST(test_refusal_names_the_affected_contact) {
         daemon_rig.estop2 = cases[i].second;
         daemon_rig_run(20);
         const char *reply = daemon_rig_ask(client, "{\"cmd\":\"reset\"}");
-        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, cases[i].said), reply);
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, cases[i].text), reply);
     }
     wheels->hal.two_contacts = false; // The last state of the second contact must not count.
     TEST_ASSERT_EQUAL_STRING("FIRST", gw_wheels_estop(wheels));
@@ -365,7 +365,7 @@ TEST(test_warning_that_persists_is_listed_once) {
         daemon_rig.link.changes++;
         daemon_rig_run(1000);
     }
-    const char *said = strstr(daemon_rig_ask(client, "{\"cmd\":\"status\"}"), "there is no e-stop line");
-    TEST_ASSERT_NOT_NULL(said);
-    TEST_ASSERT_NULL(strstr(said + 1, "there is no e-stop line"));
+    const char *status_reply = strstr(daemon_rig_ask(client, "{\"cmd\":\"status\"}"), "there is no e-stop line");
+    TEST_ASSERT_NOT_NULL(status_reply);
+    TEST_ASSERT_NULL(strstr(status_reply + 1, "there is no e-stop line"));
 }

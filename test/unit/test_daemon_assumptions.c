@@ -225,9 +225,9 @@ TEST(test_stored_offset_retains_its_time) {
     store_offset(IW_LEFT, IW_FORCE_CN, 4321);
     tell_stored();
     daemon_rig_run(3000);
-    const gw_stored_offset_t *kept = &daemon_rig.daemon->assumptions.known.offset[IW_LEFT];
-    TEST_ASSERT_EQUAL_INT32(4321, kept->offset_mN);
-    TEST_ASSERT_EQUAL_INT64(1700000000000000, kept->wall_us);
+    const gw_stored_offset_t *found_entry = &daemon_rig.daemon->assumptions.known.offset[IW_LEFT];
+    TEST_ASSERT_EQUAL_INT32(4321, found_entry->offset_mN);
+    TEST_ASSERT_EQUAL_INT64(1700000000000000, found_entry->wall_us);
 }
 
 TEST(test_tare_is_stored_with_the_figures_of_its_wheel) {
@@ -273,11 +273,11 @@ static const char *write_status(char out_line[SOCK_REPLY_MAX]) {
 /// Checks that the next status equals one without stored bytes, and that it differs from the previous one.
 static void expect_new_status(const char *changed) {
     static char next[SOCK_REPLY_MAX];
-    static char anew[SOCK_REPLY_MAX];
+    static char renewed[SOCK_REPLY_MAX];
     (void)write_status(next);
     written()->length = 0;
-    (void)write_status(anew);
-    TEST_ASSERT_EQUAL_STRING_MESSAGE(anew, next, changed);
+    (void)write_status(renewed);
+    TEST_ASSERT_EQUAL_STRING_MESSAGE(renewed, next, changed);
     TEST_ASSERT_TRUE_MESSAGE(strcmp(status_before, next) != 0, changed);
     TEST_ASSERT_GREATER_THAN_size_t(0, written()->length);
     memcpy(status_before, next, sizeof status_before);
@@ -347,9 +347,9 @@ TEST(test_store_contains_the_offset_that_a_wheel_sent) {
     force->offset_us = daemon_rig.now_us;
     force->offset_mN = 1200;
     observe();
-    const gw_stored_offset_t *kept = &daemon_rig.daemon->assumptions.known.offset[IW_LEFT];
-    TEST_ASSERT_EQUAL_INT(IW_OFFSET_WHEEL, kept->from);
-    TEST_ASSERT_EQUAL_INT32(1200, kept->offset_mN);
+    const gw_stored_offset_t *found_entry = &daemon_rig.daemon->assumptions.known.offset[IW_LEFT];
+    TEST_ASSERT_EQUAL_INT(IW_OFFSET_WHEEL, found_entry->from);
+    TEST_ASSERT_EQUAL_INT32(1200, found_entry->offset_mN);
 }
 
 TEST(test_store_drops_the_operators_value_after_a_bus_finding) {
@@ -406,16 +406,17 @@ TEST(test_status_after_tare_or_restored_file_is_current) {
     store(IW_ASSUMPTION_GEAR_RATIO, IW_CONFIRMED, IW_SOURCE_OPERATOR);
     store_offset(IW_LEFT, config()->force_unit[IW_LEFT], 1234);
     tell_stored();
-    expect_new_status("what an earlier run kept");
+    expect_new_status("what an earlier run stored");
     TEST_ASSERT_NOT_NULL(strstr(status_before, "\"since_wall_us\":1700000000000000"));
 }
 
 TEST(test_status_without_change_reuses_the_stored_bytes) {
     static char next[SOCK_REPLY_MAX];
     (void)write_status(next);
-    char *const kept = (char *)memchr(written()->text, 's', written()->length); // First letter of "setpoint_type"
-    TEST_ASSERT_NOT_NULL(kept);
-    *kept = 'S';
+    char *const found_entry =
+        (char *)memchr(written()->text, 's', written()->length); // First letter of "setpoint_type"
+    TEST_ASSERT_NOT_NULL(found_entry);
+    *found_entry = 'S';
     TEST_ASSERT_NOT_NULL(strstr(write_status(next), "\"ledger\":{\"Setpoint_type\""));
 }
 

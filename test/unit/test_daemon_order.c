@@ -88,11 +88,11 @@ static void test_log_to_a_closed_pipe_does_not_end_the_gateway(void) {
     TEST_ASSERT_EQUAL_INT(0, pipe(ends));
     (void)close(ends[0]);
     daemon_rig_keep_log();
-    const int kept = daemon_rig.daemon->log.fd;
+    const int saved = daemon_rig.daemon->log.fd;
     daemon_rig.daemon->log.fd = ends[1];
     daemon_rig_arm(client);
     daemon_rig_run(50);
-    daemon_rig.daemon->log.fd = kept;
+    daemon_rig.daemon->log.fd = saved;
     (void)close(ends[1]);
     TEST_ASSERT_FALSE(daemon_rig.ended);
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());

@@ -304,7 +304,7 @@ TEST(test_one_person_arm_without_takeover_is_busy) {
     const int other = daemon_rig_connect();
     assert_reply("{\"cmd\":\"arm\",\"name\":\"Ann\"}", "\"ok\":true");
     for (unsigned i = 0; i < 3U; i++) {
-        const char *reply = daemon_rig_ask(other, "{\"cmd\":\"arm\",\"name\":\"Ann\"}"); // A name gives no right.
+        const char *reply = daemon_rig_ask(other, "{\"cmd\":\"arm\",\"name\":\"Ann\"}"); // A name grants no right.
         TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, "\"error\":\"busy\""), reply);
         TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, "Ann"), reply);
         TEST_ASSERT_NULL(strstr(reply, "key"));

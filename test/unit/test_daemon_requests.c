@@ -18,7 +18,7 @@ static const char *wheel(const char *side) {
     return at;
 }
 
-static bool says(const char *object, const char *words) {
+static bool contains(const char *object, const char *words) {
     const char *found = strstr(object, words);
     const char *next = strstr(object + 1, "\"right\":{");
     return found != NULL && (next == NULL || found < next);
@@ -29,8 +29,8 @@ TEST(test_drive_speed_reaches_the_correct_wheel) {
     daemon_rig_drive(client, 300, 100, 1000);
     TEST_ASSERT_EQUAL_INT(300, daemon_rig.commanded_mm_s[IW_LEFT]);
     TEST_ASSERT_EQUAL_INT(100, daemon_rig.commanded_mm_s[IW_RIGHT]);
-    TEST_ASSERT_TRUE(says(wheel("left"), "\"applied_mm_s\":300,"));
-    TEST_ASSERT_TRUE(says(wheel("right"), "\"applied_mm_s\":100,"));
+    TEST_ASSERT_TRUE(contains(wheel("left"), "\"applied_mm_s\":300,"));
+    TEST_ASSERT_TRUE(contains(wheel("right"), "\"applied_mm_s\":100,"));
 }
 
 TEST(test_drive_current_reaches_the_correct_wheel) {
@@ -81,17 +81,17 @@ TEST(test_drive_number_out_of_range_is_refused_and_never_wraps) {
 TEST(test_battery_is_saturated_only_at_255) {
     daemon_rig.world.pair.battery_dV = 255;
     daemon_rig_run(100);
-    TEST_ASSERT_TRUE(says(wheel("left"), "\"saturated\":{\"battery\":true"));
-    TEST_ASSERT_TRUE(says(wheel("right"), "\"saturated\":{\"battery\":true"));
+    TEST_ASSERT_TRUE(contains(wheel("left"), "\"saturated\":{\"battery\":true"));
+    TEST_ASSERT_TRUE(contains(wheel("right"), "\"saturated\":{\"battery\":true"));
     daemon_rig.world.pair.battery_dV = 254;
     daemon_rig_run(100);
-    TEST_ASSERT_TRUE(says(wheel("left"), "\"saturated\":{\"battery\":false"));
+    TEST_ASSERT_TRUE(contains(wheel("left"), "\"saturated\":{\"battery\":false"));
     daemon_rig.world.pair.battery_dV = 255;
     daemon_rig_run(100);
     sim_world_power(&daemon_rig.world, daemon_rig.now_us, false); // A value of an offline wheel is unknown.
     daemon_rig_run(2000);
-    TEST_ASSERT_TRUE(says(wheel("left"), "\"saturated\":{\"battery\":false"));
-    TEST_ASSERT_TRUE(says(wheel("left"), "\"battery_dV\":null"));
+    TEST_ASSERT_TRUE(contains(wheel("left"), "\"saturated\":{\"battery\":false"));
+    TEST_ASSERT_TRUE(contains(wheel("left"), "\"battery_dV\":null"));
 }
 
 TEST(test_tare_of_one_wheel_does_not_change_the_other) {
@@ -347,10 +347,10 @@ TEST(test_offset_change_is_sent_to_watchers_of_force) {
     const ssize_t size = recv(client, text, sizeof text - 1U, MSG_DONTWAIT);
     TEST_ASSERT_GREATER_THAN_INT(0, (int)size);
     text[size] = '\0';
-    const char *told = strstr(text, "\"event\":\"offset\"");
-    TEST_ASSERT_NOT_NULL_MESSAGE(told, text);
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(told, "\"side\":\"right\",\"offset_mN\":"), told);
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(told, "\"provenance\":\"operator\",\"before_mN\":"), told);
+    const char *offset_event = strstr(text, "\"event\":\"offset\"");
+    TEST_ASSERT_NOT_NULL_MESSAGE(offset_event, text);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(offset_event, "\"side\":\"right\",\"offset_mN\":"), offset_event);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(offset_event, "\"provenance\":\"operator\",\"before_mN\":"), offset_event);
 }
 
 TEST(test_stop_names_the_client_that_asked_for_it) {
@@ -372,12 +372,12 @@ TEST(test_still_moving_is_reported_once_as_a_complete_event) {
     const ssize_t size = recv(client, text, sizeof text - 1U, MSG_DONTWAIT);
     TEST_ASSERT_GREATER_THAN_INT(0, (int)size);
     text[size] = '\0';
-    const char *told = strstr(text, "\"cause\":\"still_moving\",\"present\":true}");
-    TEST_ASSERT_NOT_NULL_MESSAGE(told, text);
-    TEST_ASSERT_NULL(strstr(told + strlen("\"cause\":\"still_moving"), "still_moving"));
+    const char *offset_event = strstr(text, "\"cause\":\"still_moving\",\"present\":true}");
+    TEST_ASSERT_NOT_NULL_MESSAGE(offset_event, text);
+    TEST_ASSERT_NULL(strstr(offset_event + strlen("\"cause\":\"still_moving"), "still_moving"));
 }
 
-/// Gives the daemon a snapshot with rolling wheels or not, and counts the matching events at a watcher.
+/// Passes the daemon a snapshot with rolling wheels or not, and counts the matching events at a watcher.
 static unsigned count_told(bool rolling, bool is_fault, const char *words) {
     static char text[8192];
     gw_daemon_t *daemon = daemon_rig.daemon;
@@ -448,7 +448,7 @@ TEST(test_rolling_fault_is_recorded_with_each_report) {
     box->config.blackbox_s = 1;
     box->writer.fd = ends[0];
     (void)count_told(true, false, "rolling");
-    TEST_ASSERT_EQUAL_UINT(0, take_orders(ends[1], &order)); // Somebody pushes the machine.
+    TEST_ASSERT_EQUAL_UINT(0, take_orders(ends[1], &order)); // A person pushes the machine.
     (void)count_told(true, true, "rolling");
     TEST_ASSERT_EQUAL_UINT(1, take_orders(ends[1], &order));
     TEST_ASSERT_EQUAL_STRING("rolling", order.cause);

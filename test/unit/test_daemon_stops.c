@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A stop is never refused and never queues, even if all places of both sockets are taken, in virtual time.
+// A stop is never refused and never queues, even if all places of both sockets are occupied, in virtual time.
 #include "daemon_client.h"
 
 #include "unit.h"
@@ -21,24 +21,24 @@ static unsigned crowded;
 static char text[1U << 17];
 
 /// Connects while nothing of the gateway runs.
-static int knock(sock_right_t door) {
+static int knock(sock_right_t right) {
     struct sockaddr_un address = {.sun_family = AF_UNIX};
     socklen_t length = sizeof address;
     const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0);
     TEST_ASSERT_EQUAL_INT(
-        0, getsockname(daemon_rig.daemon->clients.listener[door].fd, (struct sockaddr *)&address, &length));
+        0, getsockname(daemon_rig.daemon->clients.listener[right].fd, (struct sockaddr *)&address, &length));
     TEST_ASSERT_EQUAL_INT(0, connect(fd, (const struct sockaddr *)&address, length));
     return fd;
 }
 
-static void join(sock_right_t door, unsigned count) {
+static void join(sock_right_t right, unsigned count) {
     for (unsigned i = 0; i < count; i++) {
-        crowd[crowded++] = knock(door);
+        crowd[crowded++] = knock(right);
         daemon_rig_run(2);
     }
 }
 
-/// Takes every ordinary place of both sockets; `client` has one of them.
+/// Occupies every ordinary place of both sockets; `client` has one of them.
 static void take_all_places(void) {
     sock_clients_t *clients = &daemon_rig.daemon->clients;
     while (crowded > 0U) { // Connections of the test before
@@ -52,12 +52,12 @@ static void take_all_places(void) {
     TEST_ASSERT_EQUAL_UINT(16, clients->count[SOCK_WATCH]);
 }
 
-static void say(int fd, const char *lines) {
+static void send_lines(int fd, const char *lines) {
     (void)send(fd, lines, strlen(lines), MSG_NOSIGNAL | MSG_DONTWAIT);
 }
 
 /// Returns the received bytes, terminated.
-static const char *hear(int fd) {
+static const char *receive(int fd) {
     const ssize_t length = recv(fd, text, sizeof text - 1U, MSG_DONTWAIT);
     text[(length > 0) ? length : 0] = '\0';
     return text;
@@ -95,14 +95,14 @@ static void come_to_rest(void) {
 
 TEST(test_stop_never_refused_with_all_places_idle) {
     take_all_places();
-    for (sock_right_t door = SOCK_DRIVE; door < SOCK_RIGHTS; door++) {
+    for (sock_right_t right = SOCK_DRIVE; right < SOCK_RIGHTS; right++) {
         for (size_t i = 0; i < sizeof stops / sizeof stops[0]; i++) {
             begin_driving();
-            const int fd = knock(door);
-            say(fd, stops[i]);
+            const int fd = knock(right);
+            send_lines(fd, stops[i]);
             assert_slower(stops[i]);
             daemon_rig_run(2);
-            TEST_ASSERT_NOT_NULL_MESSAGE(strstr(hear(fd), "\"ok\":true"), text);
+            TEST_ASSERT_NOT_NULL_MESSAGE(strstr(receive(fd), "\"ok\":true"), text);
             TEST_ASSERT_TRUE(has_ended(fd));
             (void)close(fd);
             come_to_rest();
@@ -116,30 +116,31 @@ TEST(test_stop_never_refused_with_all_places_idle) {
 /// Eight connections wait for their first line; the ninth at the same time is refused without a wait.
 TEST(test_stop_places_are_eight_on_each_socket) {
     take_all_places();
-    for (sock_right_t door = SOCK_DRIVE; door < SOCK_RIGHTS; door++) {
+    for (sock_right_t right = SOCK_DRIVE; right < SOCK_RIGHTS; right++) {
         for (unsigned i = 0; i < SOCK_STOP_PLACES; i++) {
-            crowd[crowded++] = knock(door);
+            crowd[crowded++] = knock(right);
         }
-        const int next = knock(door);
+        const int next = knock(right);
         daemon_rig_run(SOCK_STOP_LEAST_US / IW_US_PER_MS - 1U);
-        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(hear(next), "too_many_clients"), text);
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(receive(next), "too_many_clients"), text);
         TEST_ASSERT_TRUE(has_ended(next));
         (void)close(next);
-        TEST_ASSERT_EQUAL_UINT((door + 1U) * SOCK_STOP_PLACES, daemon_rig.daemon->clients.count[SOCK_STOP]);
+        TEST_ASSERT_EQUAL_UINT((right + 1U) * SOCK_STOP_PLACES, daemon_rig.daemon->clients.count[SOCK_STOP]);
     }
 }
 
 /// Each connection continuously sends more requests than it reads replies.
 TEST(test_stop_never_refused_with_all_places_polling) {
     take_all_places();
-    for (sock_right_t door = SOCK_DRIVE; door < SOCK_RIGHTS; door++) {
+    for (sock_right_t right = SOCK_DRIVE; right < SOCK_RIGHTS; right++) {
         begin_driving();
         for (unsigned i = 0; i < crowded; i++) {
-            say(crowd[i], "{\"cmd\":\"watch\",\"topics\":[\"state\",\"frame\"],\"rate_hz\":100}\n{\"cmd\":\"status\"}\n"
-                          "{\"cmd\":\"why\"}\n{\"cmd\":\"status\"}\n{\"cmd\":\"status\"}\n{\"cmd\":\"why\"}\n");
+            send_lines(crowd[i],
+                       "{\"cmd\":\"watch\",\"topics\":[\"state\",\"frame\"],\"rate_hz\":100}\n{\"cmd\":\"status\"}\n"
+                       "{\"cmd\":\"why\"}\n{\"cmd\":\"status\"}\n{\"cmd\":\"status\"}\n{\"cmd\":\"why\"}\n");
         }
-        const int fd = knock(door);
-        say(fd, stops[1]);
+        const int fd = knock(right);
+        send_lines(fd, stops[1]);
         assert_slower("polling");
         (void)close(fd);
         come_to_rest();
@@ -152,12 +153,12 @@ TEST(test_stop_never_refused_if_its_line_comes_later) {
     begin_driving();
     const int fd = knock(SOCK_DRIVE);
     daemon_rig_drive(client, 300, 300, 100);
-    TEST_ASSERT_EQUAL_STRING_MESSAGE("", hear(fd), "no greeting: who waits for one does not stop");
-    say(fd, "{\"cmd\":");
+    TEST_ASSERT_EQUAL_STRING_MESSAGE("", receive(fd), "no greeting: who waits for one does not stop");
+    send_lines(fd, "{\"cmd\":");
     daemon_rig_drive(client, 300, 300, 60);
-    say(fd, "\"stop\"}\n");
+    send_lines(fd, "\"stop\"}\n");
     assert_slower("later");
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(hear(fd), "\"state\":\"stopping\""), text);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(receive(fd), "\"state\":\"stopping\""), text);
     (void)close(fd);
 }
 
@@ -167,7 +168,7 @@ TEST(test_stop_never_refused_without_descriptors) {
     begin_driving();
     TEST_ASSERT_EQUAL_INT(0, getrlimit(RLIMIT_NOFILE, &before));
     const int fd = knock(SOCK_WATCH);
-    say(fd, stops[1]);
+    send_lines(fd, stops[1]);
     const int lowest = dup(fd);
     (void)close(lowest);
     const struct rlimit none = {.rlim_cur = (rlim_t)lowest, .rlim_max = before.rlim_max};
@@ -178,15 +179,15 @@ TEST(test_stop_never_refused_without_descriptors) {
     (void)close(fd);
 }
 
-/// Opens a thousand silent connections of the same user per second, which stay open as long as possible.
-static void flood(sock_right_t door, unsigned for_ms) {
+/// Opens a thousand idle connections of the same user per second, which stay open as long as possible.
+static void flood(sock_right_t right, unsigned for_ms) {
     static int open_ones[64];
     static unsigned next;
     for (unsigned ms = 0; ms < for_ms; ms++) {
         if (open_ones[next] > 0) {
             (void)close(open_ones[next]);
         }
-        open_ones[next] = knock(door);
+        open_ones[next] = knock(right);
         next = (next + 1U) % 64U;
         daemon_rig_run(1);
     }
@@ -194,17 +195,17 @@ static void flood(sock_right_t door, unsigned for_ms) {
 
 TEST(test_stop_never_refused_with_1000_connections_a_second) {
     take_all_places();
-    for (sock_right_t door = SOCK_DRIVE; door < SOCK_RIGHTS; door++) {
+    for (sock_right_t right = SOCK_DRIVE; right < SOCK_RIGHTS; right++) {
         for (unsigned later_ms = 0; later_ms < 4U; later_ms++) { // Time of the line after its connection
-            flood(door, 300);
+            flood(right, 300);
             begin_driving();
-            flood(door, 100);
-            const int fd = knock(door);
-            flood(door, later_ms);
-            say(fd, stops[later_ms % 3U]);
-            flood(door, 30);
-            TEST_ASSERT_LESS_THAN_INT_MESSAGE(300, daemon_rig.commanded_mm_s[IW_LEFT], "beside a flood");
-            TEST_ASSERT_NOT_NULL_MESSAGE(strstr(hear(fd), "\"ok\":true"), text);
+            flood(right, 100);
+            const int fd = knock(right);
+            flood(right, later_ms);
+            send_lines(fd, stops[later_ms % 3U]);
+            flood(right, 30);
+            TEST_ASSERT_LESS_THAN_INT_MESSAGE(300, daemon_rig.commanded_mm_s[IW_LEFT], "during a flood");
+            TEST_ASSERT_NOT_NULL_MESSAGE(strstr(receive(fd), "\"ok\":true"), text);
             (void)close(fd);
             come_to_rest();
         }
@@ -225,13 +226,13 @@ TEST(test_stop_place_for_anything_else_is_refused) {
                                          "{\"cmd\":\"stop\",\"now\":true}\n"};
     take_all_places();
     begin_driving();
-    for (sock_right_t door = SOCK_DRIVE; door < SOCK_RIGHTS; door++) {
+    for (sock_right_t right = SOCK_DRIVE; right < SOCK_RIGHTS; right++) {
         for (size_t i = 0; i < sizeof others / sizeof others[0]; i++) {
-            const int fd = knock(door);
-            say(fd, others[i]);
+            const int fd = knock(right);
+            send_lines(fd, others[i]);
             daemon_rig_drive(client, 300, 300, 20);
-            TEST_ASSERT_NOT_NULL_MESSAGE(strstr(hear(fd), "\"error\":\"too_many_clients\""), others[i]);
-            TEST_ASSERT_NOT_NULL(strstr(text, (door == SOCK_DRIVE) ? "max_clients" : "max_watchers"));
+            TEST_ASSERT_NOT_NULL_MESSAGE(strstr(receive(fd), "\"error\":\"too_many_clients\""), others[i]);
+            TEST_ASSERT_NOT_NULL(strstr(text, (right == SOCK_DRIVE) ? "max_clients" : "max_watchers"));
             TEST_ASSERT_TRUE_MESSAGE(has_ended(fd), others[i]);
             (void)close(fd);
         }
@@ -241,14 +242,15 @@ TEST(test_stop_place_for_anything_else_is_refused) {
 
 TEST(test_stop_after_another_line_is_executed) {
     take_all_places();
-    for (sock_right_t door = SOCK_DRIVE; door < SOCK_RIGHTS; door++) {
+    for (sock_right_t right = SOCK_DRIVE; right < SOCK_RIGHTS; right++) {
         begin_driving();
-        const int fd = knock(door);
-        say(fd,
+        const int fd = knock(right);
+        send_lines(
+            fd,
             "{\"cmd\":\"reset\"}\n\n{\"cmd\":\"hello\"}\n{\"cmd\":\"status\"}\nstop\n{\"id\":7,\"cmd\":\"estop\"}\n");
         assert_slower("a place");
         TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
-        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(hear(fd), "\"error\":\"too_many_clients\""), text);
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(receive(fd), "\"error\":\"too_many_clients\""), text);
         TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "\"id\":7,\"ok\":true"), text);
         TEST_ASSERT_TRUE(has_ended(fd));
         (void)close(fd);
@@ -259,24 +261,24 @@ TEST(test_stop_after_another_line_is_executed) {
 /// Sends more requests than the client reads; the stop follows the request whose reply has no more space.
 static void ask_too_much_and_stop(int fd, const sock_client_t *greedy) {
     for (unsigned i = 0; i < 5000U && greedy->out_end - greedy->out_start < sizeof greedy->out / 2U; i++) {
-        say(fd, "{\"cmd\":\"status\"}\n");
-        say(client, "{\"cmd\":\"drive\",\"left_mm_s\":300,\"right_mm_s\":300}\n");
+        send_lines(fd, "{\"cmd\":\"status\"}\n");
+        send_lines(client, "{\"cmd\":\"drive\",\"left_mm_s\":300,\"right_mm_s\":300}\n");
         daemon_rig_run(1);
-        (void)((fd != client) ? hear(client) : NULL);
+        (void)((fd != client) ? receive(client) : NULL);
     }
     TEST_ASSERT_GREATER_THAN_size_t(sizeof greedy->out / 2U, greedy->out_end - greedy->out_start);
     for (unsigned i = 0; i < 100U; i++) {
         (void)snprintf(&text[i * 17U], sizeof text - i * 17U, "{\"cmd\":\"status\"}\n");
     }
     (void)strcat(text, "{\"cmd\":\"stop\"}\n");
-    say(fd, text);
+    send_lines(fd, text);
 }
 
 TEST(test_stop_of_an_overflowing_connection_is_executed) {
     take_all_places();
     begin_driving();
     ask_too_much_and_stop(crowd[0], &daemon_rig.daemon->clients.client[1]);
-    assert_slower("given up");
+    assert_slower("closed");
     TEST_ASSERT_EQUAL_UINT(15, daemon_rig.daemon->clients.count[SOCK_DRIVE]);
 }
 
@@ -284,7 +286,7 @@ TEST(test_stop_of_an_overflowing_connection_is_executed) {
 TEST(test_stop_not_yet_read_of_a_broken_connection_is_executed) {
     take_all_places();
     begin_driving();
-    say(crowd[0], "{\"cmd\":\"stop\"}\n");
+    send_lines(crowd[0], "{\"cmd\":\"stop\"}\n");
     sock_client_break(&daemon_rig.daemon->clients.client[1]);
     assert_slower("broken");
     TEST_ASSERT_EQUAL_UINT(15, daemon_rig.daemon->clients.count[SOCK_DRIVE]);
@@ -294,16 +296,17 @@ TEST(test_stop_not_yet_read_of_a_broken_connection_is_executed) {
 TEST(test_stop_of_an_overflowing_holder_has_cause_client_stop) {
     begin_driving();
     ask_too_much_and_stop(client, &daemon_rig.daemon->clients.client[0]);
-    assert_slower("given up");
+    assert_slower("closed");
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_CLIENT_STOP, gw_wheels_look(&daemon_rig.daemon->wheels).stop->cause);
 }
 
 TEST(test_stop_place_answers_one_line_and_all_stops) {
     take_all_places();
     const int fd = knock(SOCK_DRIVE);
-    say(fd, "{\"id\":1,\"cmd\":\"stop\"}\n{\"id\":2,\"cmd\":\"estop\"}\n{\"id\":3,\"cmd\":\"reset\",\"stop\":1}\n");
+    send_lines(fd,
+               "{\"id\":1,\"cmd\":\"stop\"}\n{\"id\":2,\"cmd\":\"estop\"}\n{\"id\":3,\"cmd\":\"reset\",\"stop\":1}\n");
     daemon_rig_run(20);
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(hear(fd), "\"id\":1,\"ok\":true"), text);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(receive(fd), "\"id\":1,\"ok\":true"), text);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "\"id\":2,\"ok\":true"), text);
     TEST_ASSERT_NULL_MESSAGE(strstr(text, "\"id\":3"), text);
     TEST_ASSERT_TRUE(has_ended(fd));
@@ -320,12 +323,12 @@ TEST(test_stop_place_of_a_silent_connection_is_free_after_200_ms) {
     daemon_rig.waits = 0;
     daemon_rig_run(150);
     TEST_ASSERT_EQUAL_UINT_MESSAGE(SOCK_STOP_PLACES, clients->count[SOCK_STOP],
-                                   "while nobody wants its place it stays");
-    TEST_ASSERT_LESS_THAN_UINT_MESSAGE(400, daemon_rig.waits, "and keeps nobody awake");
+                                   "while no client needs its place it stays");
+    TEST_ASSERT_LESS_THAN_UINT_MESSAGE(400, daemon_rig.waits, "and does not wake the loop");
     daemon_rig_run(60);
     TEST_ASSERT_EQUAL_UINT(0, clients->count[SOCK_STOP]);
     for (unsigned i = before; i < crowded; i++) {
-        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(hear(crowd[i]), "\"error\":\"too_many_clients\""), text);
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(receive(crowd[i]), "\"error\":\"too_many_clients\""), text);
         TEST_ASSERT_TRUE(has_ended(crowd[i]));
     }
 }
@@ -333,11 +336,11 @@ TEST(test_stop_place_of_a_silent_connection_is_free_after_200_ms) {
 // Share of each user --------------------------------------------------------------------------------------------------
 
 /// Connects as another user. Returns -1 if the user of this test cannot change its id.
-static int knock_as(uid_t uid, sock_right_t door) {
+static int knock_as(uid_t uid, sock_right_t right) {
     if (geteuid() != 0 || seteuid(uid) != 0) {
         return -1;
     }
-    const int fd = knock(door); // The socket has no name in the file system.
+    const int fd = knock(right); // The socket has no name in the file system.
     TEST_ASSERT_EQUAL_INT(0, seteuid(0));
     return fd;
 }
@@ -370,7 +373,7 @@ TEST(test_stop_places_of_one_user_are_at_most_half) {
     TEST_ASSERT_EQUAL_UINT(SOCK_STOP_PLACES / 2U, held_by(0));
     begin_driving();
     const int fd = knock_as(FOREIGN, SOCK_DRIVE); // A stop of this user needs no place.
-    say(fd, stops[0]);
+    send_lines(fd, stops[0]);
     assert_slower("beyond its share");
     (void)close(fd);
 }
@@ -380,7 +383,7 @@ TEST(test_stop_in_a_stop_place_names_its_process) {
     take_all_places();
     begin_driving();
     const int fd = knock(SOCK_WATCH);
-    say(fd, stops[0]);
+    send_lines(fd, stops[0]);
     assert_slower("named");
     (void)close(fd);
     come_to_rest();

@@ -75,7 +75,7 @@ static bool is_denied(const char *reply) {
     return strstr(reply, "\"error\":\"denied\"") != NULL && strstr(reply, "this socket is for watching") != NULL;
 }
 
-static void say(int client, const char *line) {
+static void send_line(int client, const char *line) {
     (void)send(client, line, strlen(line), MSG_NOSIGNAL | MSG_DONTWAIT);
 }
 
@@ -191,14 +191,14 @@ TEST(test_watcher_beyond_the_limit_is_refused_until_one_ends) {
 TEST(test_watchers_with_many_requests_do_not_delay_a_driver) {
     connect_crowd(CROWD - 1U);
     for (unsigned i = 0; i < crowded; i++) {
-        say(crowd[i], "{\"cmd\":\"watch\",\"topics\":[\"state\",\"force\",\"frame\"],\"rate_hz\":100}\n");
+        send_line(crowd[i], "{\"cmd\":\"watch\",\"topics\":[\"state\",\"force\",\"frame\"],\"rate_hz\":100}\n");
     }
     daemon_rig_arm(driver);
     const uint32_t sent = daemon_rig.sent[IW_LEFT];
     const iw_time_us_t begin_us = daemon_rig.now_us;
     for (unsigned n = 0; n < 50U; n++) {
         for (unsigned i = 0; i < crowded; i++) {
-            say(crowd[i], "{\"cmd\":\"status\"}\n{\"cmd\":\"arm\"}\n{\"cmd\":\"why\"}\n");
+            send_line(crowd[i], "{\"cmd\":\"status\"}\n{\"cmd\":\"arm\"}\n{\"cmd\":\"why\"}\n");
         }
         daemon_rig_drive(driver, 300, 300, 20); // Fails if a command has no reply within 20 ms.
     }
@@ -246,11 +246,11 @@ TEST(test_frames_are_sent_singly_to_few_and_grouped_to_many) {
     unsigned to_many;
     connect_crowd(GW_FRAMES_ONE_BY_ONE + 1U);
     for (unsigned i = 1; i < crowded; i++) {
-        say(crowd[i], "{\"cmd\":\"watch\",\"topics\":[\"frame\"]}\n");
+        send_line(crowd[i], "{\"cmd\":\"watch\",\"topics\":[\"frame\"]}\n");
     }
     daemon_rig_run(20);
     TEST_ASSERT_GREATER_THAN_UINT(60, moments_with_frames(crowd[1], &to_few));
-    say(crowd[0], "{\"cmd\":\"watch\",\"topics\":[\"frame\"]}\n");
+    send_line(crowd[0], "{\"cmd\":\"watch\",\"topics\":[\"frame\"]}\n");
     daemon_rig_run(20);
     TEST_ASSERT_UINT_WITHIN(1, 200000U / GW_FRAMES_TOGETHER_US, moments_with_frames(crowd[1], &to_many));
     TEST_ASSERT_UINT_WITHIN_MESSAGE(4, to_few, to_many, "each of them, once");
@@ -261,7 +261,7 @@ TEST(test_state_events_for_many_clients_are_equal) {
     char second[SOCK_REPLY_MAX];
     connect_crowd(2);
     for (unsigned i = 0; i < crowded; i++) {
-        say(crowd[i], "{\"cmd\":\"watch\",\"topics\":[\"force\"],\"rate_hz\":50}\n");
+        send_line(crowd[i], "{\"cmd\":\"watch\",\"topics\":[\"force\"],\"rate_hz\":50}\n");
         daemon_rig_run(7); // The clients subscribe at different times.
     }
     daemon_rig_run(100);
@@ -276,18 +276,18 @@ TEST(test_state_events_for_many_clients_are_equal) {
 
 TEST(test_flood_of_requests_of_a_watcher_is_served_at_its_rate) {
     for (unsigned i = 0; i < 100U; i++) {
-        say(watcher, "{\"cmd\":\"hello\"}\n");
+        send_line(watcher, "{\"cmd\":\"hello\"}\n");
     }
     daemon_rig_run(1);
     TEST_ASSERT_EQUAL_UINT(SOCK_LINES_PER_CYCLE, replies_of(watcher));
     const uint32_t waits = daemon_rig.waits;
     daemon_rig_run(100);
     TEST_ASSERT_UINT_WITHIN(1, 100000U / SOCK_WATCHER_LINE_US, replies_of(watcher));
-    TEST_ASSERT_LESS_THAN_UINT_MESSAGE(400, daemon_rig.waits - waits, "lines that have to wait keep nobody awake");
+    TEST_ASSERT_LESS_THAN_UINT_MESSAGE(400, daemon_rig.waits - waits, "waiting lines do not wake the loop");
     daemon_rig_run(1000);
     TEST_ASSERT_UINT_WITHIN(2, 100U - SOCK_LINES_PER_CYCLE - 10U, replies_of(watcher));
     for (unsigned i = 0; i < 10U; i++) {
-        say(watcher, "{\"cmd\":\"hello\"}\n");
+        send_line(watcher, "{\"cmd\":\"hello\"}\n");
     }
     daemon_rig_run(1);
     TEST_ASSERT_EQUAL_UINT_MESSAGE(SOCK_LINES_PER_CYCLE, replies_of(watcher), "after a pause");
@@ -300,7 +300,7 @@ TEST(test_flood_of_estop_latches_and_adds_few_stops) {
     const uint32_t stops = gw_wheels_look(&daemon_rig.daemon->wheels).stop->number;
     for (unsigned n = 0; n < 50U; n++) {
         for (unsigned i = 0; i < crowded; i++) {
-            say(crowd[i], "{\"cmd\":\"estop\"}\n");
+            send_line(crowd[i], "{\"cmd\":\"estop\"}\n");
         }
         daemon_rig_run(20);
         TEST_ASSERT_EQUAL_INT(0, daemon_rig.commanded_mm_s[IW_LEFT]);
@@ -330,14 +330,14 @@ TEST(test_estop_repeated_within_100_ms_is_answered_without_effect) {
 }
 
 TEST(test_estop_of_a_watcher_that_ends_immediately_latches) {
-    say(watcher, "{\"cmd\":\"status\"}\n{\"cmd\":\"status\"}\n{\"cmd\":\"estop\"}\n");
+    send_line(watcher, "{\"cmd\":\"status\"}\n{\"cmd\":\"status\"}\n{\"cmd\":\"estop\"}\n");
     (void)close(watcher);
     watcher = -1;
     const uint32_t waits = daemon_rig.waits;
     daemon_rig_run(100);
     TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
     TEST_ASSERT_EQUAL_UINT(0, daemon_rig.daemon->clients.count[SOCK_WATCH]);
-    TEST_ASSERT_LESS_THAN_UINT_MESSAGE(400, daemon_rig.waits - waits, "one that has gone keeps nobody awake");
+    TEST_ASSERT_LESS_THAN_UINT_MESSAGE(400, daemon_rig.waits - waits, "a client that has gone does not wake the loop");
 }
 
 TEST(test_flood_of_new_watchers_is_accepted_at_its_rate) {
@@ -355,7 +355,7 @@ TEST(test_flood_of_new_watchers_is_accepted_at_its_rate) {
     daemon_rig_run(9);
     TEST_ASSERT_EQUAL_UINT(1U + SOCK_ACCEPTS_PER_CYCLE * (9000U / SOCK_WATCHER_ACCEPT_US + 1U),
                            daemon_rig.daemon->clients.count[SOCK_WATCH]);
-    TEST_ASSERT_LESS_THAN_UINT_MESSAGE(40, daemon_rig.waits, "those who have to wait keep nobody awake");
+    TEST_ASSERT_LESS_THAN_UINT_MESSAGE(40, daemon_rig.waits, "waiting clients do not wake the loop");
     daemon_rig_run(20);
     TEST_ASSERT_EQUAL_UINT(61, daemon_rig.daemon->clients.count[SOCK_WATCH]);
     TEST_ASSERT_EQUAL_UINT(0, daemon_rig_logged("refused a client"));
@@ -401,7 +401,7 @@ TEST(test_client_without_descriptor_is_accepted_later) {
     TEST_ASSERT_EQUAL_INT(0, setrlimit(RLIMIT_NOFILE, &before));
     TEST_ASSERT_EQUAL_UINT(1, count);
     TEST_ASSERT_EQUAL_UINT(1, lines);
-    TEST_ASSERT_LESS_THAN_UINT32_MESSAGE(100, waits, "meanwhile it keeps nobody awake");
+    TEST_ASSERT_LESS_THAN_UINT32_MESSAGE(100, waits, "meanwhile it does not wake the loop");
     TEST_ASSERT_EQUAL_UINT(1, daemon_rig.daemon->clients.count[SOCK_DRIVE]);
     daemon_rig_run(10);
     TEST_ASSERT_EQUAL_UINT(2, daemon_rig.daemon->clients.count[SOCK_DRIVE]);
@@ -409,7 +409,7 @@ TEST(test_client_without_descriptor_is_accepted_later) {
 
 TEST(test_requests_sent_together_are_answered_in_order) {
     char text[4096];
-    say(driver, "{\"id\":71,\"cmd\":\"why\"}\n{\"id\":72,\"cmd\":\"hello\"}\n");
+    send_line(driver, "{\"id\":71,\"cmd\":\"why\"}\n{\"id\":72,\"cmd\":\"hello\"}\n");
     daemon_rig_run(1);
     const ssize_t length = recv(driver, text, sizeof text - 1U, MSG_DONTWAIT);
     TEST_ASSERT_GREATER_THAN_INT(0, (int)length);
@@ -423,7 +423,7 @@ TEST(test_round_of_sending_ends_after_its_time) {
     static char text[65536];
     connect_crowd(CROWD - 1U);
     for (unsigned i = 0; i < crowded; i++) {
-        say(crowd[i], "{\"cmd\":\"watch\",\"topics\":[\"state\"]}\n");
+        send_line(crowd[i], "{\"cmd\":\"watch\",\"topics\":[\"state\"]}\n");
     }
     daemon_rig_run(50);
     for (unsigned i = 0; i < crowded; i++) {
@@ -442,7 +442,7 @@ TEST(test_round_of_sending_ends_after_its_time) {
     }
     TEST_ASSERT_UINT_WITHIN(1, SOCK_ROUND_US / 100U, reached);
     TEST_ASSERT_TRUE(sock_service_is_busy(clients));
-    daemon_rig_run(20); // All is sent: a client without waiting bytes takes no time.
+    daemon_rig_run(20); // All is sent: a client without waiting bytes needs no time.
     daemon_rig.look_takes_us = 2U * SOCK_ROUND_US;
     sock_service_flush(clients, IW_CLIENT_NONE);
     daemon_rig.look_takes_us = 0;

@@ -97,7 +97,7 @@ TEST(test_diverge_lag_is_configured) {
     TEST_ASSERT_INT32_WITHIN(4000, 632100, pair.expected_um_s[IW_LEFT]);
 }
 
-/// A wheel that does not turn counts double: 60 mm at 2000 mm/s take 30 ms, and a little more because of the leak.
+/// A wheel that does not turn counts double: 60 mm at 2000 mm/s need 30 ms, and a little more because of the leak.
 TEST(test_diverge_blocked_wheel_is_slow_after_60_mm) {
     for (unsigned side = 0; side < IW_SIDES; side++) {
         begin();

@@ -53,7 +53,7 @@ static void settle(iw_time_us_t now_us, iw_side_t side, int32_t speed_mm_s) {
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(now_us, side, speed_mm_s, 0));
 }
 
-/// Returns the verdict on a change of speed in the given time, with a new envelope.
+/// Returns the verdict on a change of speed in this time, with a new envelope.
 static iw_envelope_verdict_t change(int32_t from_mm_s, int32_t to_mm_s, iw_time_us_t elapsed_us) {
     restart();
     settle(START_US, IW_LEFT, from_mm_s);

@@ -20,7 +20,7 @@
 static size_t length;
 static char folder[] = "/tmp/iwheel-keeper-XXXXXX";
 static gw_file_store_t store;
-static const char *heard;
+static const char *reply;
 static int error;
 static char second[128];
 static int fsync_error; ///< Error of fsync in a process that is opened after it is set; 0: none
@@ -41,7 +41,7 @@ static gw_file_store_news_t next_news(void) {
     gw_file_store_news_t news = GW_FILE_STORE_NO_NEWS;
     struct pollfd wait = {.fd = store.child.fd, .events = POLLIN};
     while (news == GW_FILE_STORE_NO_NEWS && poll(&wait, 1, 5000) == 1) {
-        news = gw_file_store_receive(&store, &heard, &length, &error);
+        news = gw_file_store_receive(&store, &reply, &length, &error);
     }
     return news;
 }
@@ -90,7 +90,7 @@ static void test_file_store_writes_reads_back_and_sets_aside(void) {
     gw_file_store_close(&store);
     open_store(folder, GW_FILE_STORE_READ);
     TEST_ASSERT_EQUAL_UINT(3, length);
-    TEST_ASSERT_EQUAL_MEMORY("one", heard, 3);
+    TEST_ASSERT_EQUAL_MEMORY("one", reply, 3);
     gw_file_store_set_aside(&store);
     TEST_ASSERT_TRUE(gw_file_store_write(&store, "two", 3));
     TEST_ASSERT_EQUAL_INT(GW_FILE_STORE_WRITTEN, next_news());
@@ -246,7 +246,7 @@ static void test_file_store_ended_process_is_reported_once(void) {
     TEST_ASSERT_EQUAL_INT(GW_FILE_STORE_GONE, next_news());
     gw_file_store_close(&store);
     TEST_ASSERT_FALSE(gw_file_store_write(&store, "new", 3));
-    TEST_ASSERT_EQUAL_INT(GW_FILE_STORE_NO_NEWS, gw_file_store_receive(&store, &heard, &length, &error));
+    TEST_ASSERT_EQUAL_INT(GW_FILE_STORE_NO_NEWS, gw_file_store_receive(&store, &reply, &length, &error));
 }
 
 int main(void) {

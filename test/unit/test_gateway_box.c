@@ -191,11 +191,11 @@ TEST(test_recording_contains_entries_after_the_stop) {
     TEST_ASSERT_EQUAL(11, box.last.frames);
     read_file("stop-000001-estop_line.jsonl", text, sizeof text);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "\"bus\":\"can0\""), text);
-    const char *told = strstr(text, "{\"type\":\"state\"");
-    TEST_ASSERT_NOT_NULL_MESSAGE(told, text);
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(told, "\"state\":\"latched\""), told);
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(told, "\"applied_left_mm_s\":12,"), told);
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(told, "\"applied_right_mm_s\":-34"), told);
+    const char *line = strstr(text, "{\"type\":\"state\"");
+    TEST_ASSERT_NOT_NULL_MESSAGE(line, text);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(line, "\"state\":\"latched\""), line);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(line, "\"applied_left_mm_s\":12,"), line);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(line, "\"applied_right_mm_s\":-34"), line);
 }
 
 TEST(test_recording_excludes_entries_older_than_blackbox_s) {
@@ -461,7 +461,7 @@ TEST(test_missing_directory_is_reported_at_start_and_each_stop) {
 }
 
 /// Writes the log lines of the next result to `text`.
-static void told(const char *cause, char *text, size_t size) {
+static void line(const char *cause, char *text, size_t size) {
     FILE *file = tmpfile();
     sock_log_t log = {.program = "test", .credit = 10, .fd = fileno(file), .level = SOCK_LOG_INFO};
     struct pollfd entry = {.fd = box.writer.fd, .events = POLLIN};
@@ -479,15 +479,15 @@ static void told(const char *cause, char *text, size_t size) {
 TEST(test_result_of_a_recording_is_logged) {
     char text[1024];
     start();
-    told("estop_line", text, sizeof text);
+    line("estop_line", text, sizeof text);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "stop 3 is recorded in "), text);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "stop-000001-estop_line.log (10 frames, "), text);
     gw_box_close(&box);
     (void)snprintf(config.record.directory, sizeof config.record.directory, "%s/no/such/folder", folder);
     start();
-    told(NULL, text, sizeof text);
+    line(NULL, text, sizeof text);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "no recording can be written to "), text);
-    told("estop_line", text, sizeof text);
+    line("estop_line", text, sizeof text);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "stop 3 is not recorded in "), text);
 }
 
@@ -520,11 +520,11 @@ TEST(test_frozen_writer_never_blocks_the_gateway) {
     TEST_ASSERT_EQUAL(0, kill(box.writer.pid, SIGSTOP));
     const gw_box_order_t order = stopped("estop_line");
     const iw_time_us_t begin_us = iwl_clock_now_us();
-    unsigned taken = 0;
-    while (taken < 100000U && gw_box_write(&box, &order)) {
-        taken++;
+    unsigned written = 0;
+    while (written < 100000U && gw_box_write(&box, &order)) {
+        written++;
     }
-    TEST_ASSERT_LESS_THAN(100000U, taken);
+    TEST_ASSERT_LESS_THAN(100000U, written);
     TEST_ASSERT_LESS_THAN(1000000U, iwl_clock_now_us() - begin_us);
     TEST_ASSERT_EQUAL(GW_CHILD_SILENT, gw_box_take(&box));
     TEST_ASSERT_EQUAL(0, kill(box.writer.pid, SIGKILL));
@@ -582,14 +582,14 @@ TEST(test_kill_of_the_gateway_is_recorded_only_while_sending) {
 /// Recording of a rolling machine: it is no stop, so `box.stop` still refers to the last stop.
 TEST(test_rolling_is_recorded_and_is_no_stop) {
     static char text[16384];
-    static const iw_codec_wheel_t told;
+    static const iw_codec_wheel_t line;
     iw_snapshot_t seen = {.state = IW_STATE_LISTENING, .at_us = iwl_clock_now_us() - GW_BOX_AFTER_US};
     sock_log_t log;
     start();
     record("estop_line", 0);
     sock_log_open(&log, SOCK_LOG_ERROR);
-    seen.wheel[IW_LEFT] = (iw_snapshot_wheel_t){.told = &told, .speed_mm_s = 1500};
-    seen.wheel[IW_RIGHT] = (iw_snapshot_wheel_t){.told = &told, .speed_mm_s = -101, .heard = true};
+    seen.wheel[IW_LEFT] = (iw_snapshot_wheel_t){.told = &line, .speed_mm_s = 1500};
+    seen.wheel[IW_RIGHT] = (iw_snapshot_wheel_t){.told = &line, .speed_mm_s = -101, .heard = true};
     gw_record_rolling(&box, &log, &seen);
     TEST_ASSERT_EQUAL(GW_CHILD_SAID, wait_news());
     TEST_ASSERT_EQUAL(0, box.last.number);

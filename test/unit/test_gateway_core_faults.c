@@ -35,7 +35,7 @@ static void assert_latched(iw_cause_t cause) {
     TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
 }
 
-/// One wheel is offline: from 400 mm/s the common ramp takes 267 ms.
+/// One wheel is offline: from 400 mm/s the common ramp lasts 267 ms.
 static void assert_latched_with_a_ramp(void) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, state());
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_WHEEL_LOST, stop()->cause);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Silence after the zeros: setpoints that are still in a controller are taken back, or reported.
+// Silence after the zeros: setpoints that are still in a controller are withdrawn or reported.
 #include "gateway_rig.h"
 #include "unit.h"
 
@@ -50,7 +50,7 @@ static void cut_power_in_motion(int purge_result) {
     run_to_silence();
 }
 
-/// Without acknowledgement the zeros of an arm stay in the controller. Ends when the arm is given up.
+/// Without acknowledgement the zeros of an arm stay in the controller. Ends when the gateway withdraws the arm.
 static void arm_in_vain(int purge_result) {
     gateway_rig_run(&rig, MS(1100));
     rig.bus.purge_result = purge_result;
@@ -187,7 +187,7 @@ TEST(test_gateway_ordinary_stop_does_not_purge) {
     }
 }
 
-/// Sends the zeros of an arm that is given up immediately after them.
+/// Sends the zeros of an arm that is withdrawn immediately after them.
 static iw_time_us_t leave_young_zeros(void) {
     gateway_rig_run(&rig, MS(1100));
     rig.bus.acknowledged = false;

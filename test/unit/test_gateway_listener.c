@@ -24,7 +24,7 @@ static gateway_config_t config;
 static sock_listener_t listener;
 static sock_log_t people; ///< Log for the operator
 static char folder[64];
-static char said[1024];
+static char logged[1024];
 
 static const char *in_folder(const char *name) {
     static char path[96];
@@ -39,7 +39,7 @@ void setUp(void) {
     (void)snprintf(config.northbound.socket, sizeof config.northbound.socket, "%s/gateway.sock", folder);
     (void)snprintf(config.northbound.group, sizeof config.northbound.group, "none");
     listener = (sock_listener_t){.fd = -1, .reserve_fd = -1, .folder = {.fd = -1}};
-    memset(said, 0, sizeof said);
+    memset(logged, 0, sizeof logged);
     sock_log_open(&people, SOCK_LOG_WARNING);
     sock_log_close(&people);
     people.fd = open(in_folder("log.txt"), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
@@ -54,7 +54,7 @@ void tearDown(void) {
 }
 
 static int prepare(void) {
-    FILE *err = fmemopen(said, sizeof said, "w");
+    FILE *err = fmemopen(logged, sizeof logged, "w");
     const sock_listener_config_t wanted = {"iwheel-gateway", SOCK_DRIVE, config.northbound.socket,
                                            config.northbound.group, config.northbound.mode};
     const int result = sock_listener_prepare(&listener, &wanted, err);
@@ -63,14 +63,14 @@ static int prepare(void) {
 }
 
 static int make(void) {
-    FILE *err = fmemopen(said, sizeof said, "w");
+    FILE *err = fmemopen(logged, sizeof logged, "w");
     const int result = sock_listener_open(&listener, &people, err);
     (void)fclose(err);
     return result;
 }
 
 static void assert_said(const char *words) {
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, words), said);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(logged, words), logged);
 }
 
 static void assert_logged(const char *words) {
@@ -81,10 +81,10 @@ static void assert_logged(const char *words) {
     TEST_ASSERT_TRUE_MESSAGE((words[0] == '\0') ? length == 0 : strstr(text, words) != NULL, text);
 }
 
-static void refused_to_prepare(int code, const char *why, const char *cure) {
-    TEST_ASSERT_EQUAL_INT_MESSAGE(code, prepare(), said);
+static void refused_to_prepare(int code, const char *why, const char *fix) {
+    TEST_ASSERT_EQUAL_INT_MESSAGE(code, prepare(), logged);
     assert_said(why);
-    assert_said(cure);
+    assert_said(fix);
     TEST_ASSERT_EQUAL_INT(-1, listener.folder.fd);
 }
 
@@ -98,7 +98,7 @@ static bool is_root(void) {
 TEST(test_socket_own_folder_is_used_without_a_message) {
     TEST_ASSERT_EQUAL_INT(0, chmod(folder, 0755));
     TEST_ASSERT_EQUAL_INT(0, prepare());
-    TEST_ASSERT_EQUAL_STRING("", said);
+    TEST_ASSERT_EQUAL_STRING("", logged);
 }
 
 TEST(test_socket_folder_writable_by_others_is_refused_with_fix) {
@@ -140,18 +140,18 @@ TEST(test_socket_folder_behind_a_symbolic_link_is_refused) {
 TEST(test_socket_folder_replaced_after_the_check_is_not_used) {
     char aside[80];
     struct stat status;
-    (void)snprintf(aside, sizeof aside, "%s/kept", folder);
+    (void)snprintf(aside, sizeof aside, "%s/moved", folder);
     TEST_ASSERT_EQUAL_INT(0, mkdir(in_folder("a"), 0755));
     TEST_ASSERT_EQUAL_INT(0, mkdir(in_folder("b"), 0755));
     (void)snprintf(config.northbound.socket, sizeof config.northbound.socket, "%s/a/gateway.sock", folder);
     TEST_ASSERT_EQUAL_INT(0, prepare());
     TEST_ASSERT_EQUAL_INT(0, rename(in_folder("a"), aside));
     TEST_ASSERT_EQUAL_INT(0, symlink("b", in_folder("a")));
-    TEST_ASSERT_EQUAL_INT_MESSAGE(0, make(), said);
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, make(), logged);
     TEST_ASSERT_EQUAL_INT(-1, lstat(in_folder("b/gateway.sock"), &status));
-    TEST_ASSERT_EQUAL_INT(0, lstat(in_folder("kept/gateway.sock"), &status));
+    TEST_ASSERT_EQUAL_INT(0, lstat(in_folder("moved/gateway.sock"), &status));
     sock_listener_close(&listener);
-    TEST_ASSERT_EQUAL_INT(-1, lstat(in_folder("kept/gateway.sock"), &status));
+    TEST_ASSERT_EQUAL_INT(-1, lstat(in_folder("moved/gateway.sock"), &status));
 }
 
 TEST(test_socket_has_its_mode_and_group_same_working_directory) {
@@ -212,7 +212,7 @@ TEST(test_socket_of_another_user_does_not_prevent_start_of_root) {
     TEST_ASSERT_EQUAL_INT(0, chown(in_folder("gateway.sock"), STRANGER, STRANGER));
     TEST_ASSERT_EQUAL_INT(0, chmod(folder, 01777));
     TEST_ASSERT_EQUAL_INT(0, prepare());
-    TEST_ASSERT_EQUAL_INT_MESSAGE(0, make(), said);
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, make(), logged);
     (void)close(fd);
 }
 
@@ -233,7 +233,7 @@ TEST(test_socket_link_or_plain_file_at_its_path_is_refused) {
 TEST(test_socket_of_another_program_is_not_removed_at_close) {
     TEST_ASSERT_EQUAL_INT(0, prepare());
     TEST_ASSERT_EQUAL_INT(0, make());
-    TEST_ASSERT_EQUAL_INT(0, rename(in_folder("gateway.sock"), strcat(strcpy(said, folder), "/moved")));
+    TEST_ASSERT_EQUAL_INT(0, rename(in_folder("gateway.sock"), strcat(strcpy(logged, folder), "/moved")));
     (void)put_socket(false);
     sock_listener_close(&listener);
     TEST_ASSERT_EQUAL_INT(0, access(in_folder("gateway.sock"), F_OK));

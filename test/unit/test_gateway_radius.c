@@ -79,14 +79,14 @@ TEST(test_gateway_radius_standstill_is_the_same_real_speed) {
         int16_t at_rest_rpm;
     } cases[] = {{60, 7}, {192, 2}, {400, 1}};
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
-        iw_codec_wheel_t told = {.speed = {.speed_rpm = cases[i].at_rest_rpm}};
+        iw_codec_wheel_t telemetry = {.speed = {.speed_rpm = cases[i].at_rest_rpm}};
         begin(cases[i].radius_mm);
         iw_wheel_t *const wheel = &rig.gateway.wheel[IW_LEFT];
-        iw_wheel_receive(wheel, rig.now_us, IW_CODEC_SPEED, &told, true);
+        iw_wheel_receive(wheel, rig.now_us, IW_CODEC_SPEED, &telemetry, true);
         TEST_ASSERT_GREATER_THAN_UINT32(0, iw_wheel_rest_us(wheel, rig.now_us + 1U));
         TEST_ASSERT_LESS_OR_EQUAL_INT32(45, wheel->speed_mm_s);
-        told.speed.speed_rpm++;
-        iw_wheel_receive(wheel, rig.now_us, IW_CODEC_SPEED, &told, true);
+        telemetry.speed.speed_rpm++;
+        iw_wheel_receive(wheel, rig.now_us, IW_CODEC_SPEED, &telemetry, true);
         TEST_ASSERT_EQUAL_UINT32(0, iw_wheel_rest_us(wheel, rig.now_us + 1U));
         TEST_ASSERT_GREATER_THAN_INT32(45, wheel->speed_mm_s);
     }

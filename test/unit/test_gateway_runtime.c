@@ -25,7 +25,7 @@ static gateway_config_t one;
 static gateway_config_t other;
 static gw_runtime_t first;
 static gw_runtime_t second;
-static char said[2048];
+static char logged[2048];
 static pid_t child;
 
 static const char *under(const char *name) {
@@ -41,9 +41,9 @@ static void configure(gateway_config_t *config, const char *bus, const char *fol
     (void)mkdir(under(folder), 0755);
 }
 
-/// Opens the runtime and stores its messages in `said`.
+/// Opens the runtime and stores its messages in `logged`.
 static int open_runtime(gw_runtime_t *runtime, const gateway_config_t *config) {
-    FILE *err = fmemopen(said, sizeof said, "w");
+    FILE *err = fmemopen(logged, sizeof logged, "w");
     const int result = gw_runtime_open(runtime, config->bus.interface, config->northbound.socket, shared, err);
     (void)fclose(err);
     return result;
@@ -52,7 +52,7 @@ static int open_runtime(gw_runtime_t *runtime, const gateway_config_t *config) {
 static void assert_said_pid(pid_t pid) {
     char text[32];
     (void)snprintf(text, sizeof text, "process %ld ", (long)pid);
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, text), said);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(logged, text), logged);
 }
 
 static bool exists(const char *path) {
@@ -72,7 +72,7 @@ void setUp(void) {
     memcpy(strrchr(top, '-'), "-XXXXXX", 8);
     TEST_ASSERT_NOT_NULL(mkdtemp(top));
     (void)snprintf(shared, sizeof shared, "%s/shared", top);
-    memset(said, 0, sizeof said);
+    memset(logged, 0, sizeof logged);
     configure(&one, interface(), "one");
     configure(&other, interface(), "other");
 }
@@ -102,8 +102,8 @@ TEST(test_lock_second_gateway_with_other_socket_is_refused) {
     TEST_ASSERT_EQUAL_INT(0, open_runtime(&first, &one));
     TEST_ASSERT_EQUAL_INT(EX_UNAVAILABLE, open_runtime(&second, &other));
     assert_said_pid(getpid());
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, interface()), said);
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, "sends nothing"), said);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(logged, interface()), logged);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(logged, "sends nothing"), logged);
 }
 
 TEST(test_lock_of_interface_is_free_after_close_and_exit) {
@@ -140,7 +140,7 @@ TEST(test_lock_second_gateway_on_local_bus_is_refused) {
     TEST_ASSERT_EQUAL_INT(0, open_runtime(&first, &one));
     TEST_ASSERT_EQUAL_INT(EX_UNAVAILABLE, open_runtime(&second, &other));
     assert_said_pid(getpid());
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, bus + 5), said);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(logged, bus + 5), logged);
     TEST_ASSERT_TRUE(gw_runtime_mark(&first, true));
     TEST_ASSERT_TRUE(exists(under("bus.armed")));
     TEST_ASSERT_FALSE(exists(shared));
@@ -273,9 +273,9 @@ TEST(test_lock_name_held_by_another_user_is_acquired_and_named) {
         return;
     }
     TEST_ASSERT_EQUAL_INT(0, in_process_of(STRANGER, squat_listening));
-    TEST_ASSERT_EQUAL_INT_MESSAGE(0, open_runtime(&first, &one), said);
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, open_runtime(&first, &one), logged);
     assert_said_pid(child);
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, "of user 65534 holds @iwheel-gateway/"), said);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(logged, "of user 65534 holds @iwheel-gateway/"), logged);
     TEST_ASSERT_EQUAL_INT(EX_UNAVAILABLE, open_runtime(&second, &other));
 }
 
@@ -284,10 +284,10 @@ TEST(test_lock_name_bound_by_another_user_is_acquired_and_logged) {
         return;
     }
     TEST_ASSERT_EQUAL_INT(0, in_process_of(STRANGER, squat_silently));
-    TEST_ASSERT_EQUAL_INT_MESSAGE(0, open_runtime(&first, &one), said);
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, "another program"),
-                                 said); // Also the user, if the kernel lists sockets
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, "holds @iwheel-gateway/"), said);
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, open_runtime(&first, &one), logged);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(logged, "another program"),
+                                 logged); // Also the user, if the kernel lists sockets
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(logged, "holds @iwheel-gateway/"), logged);
     TEST_ASSERT_EQUAL_INT(EX_UNAVAILABLE, open_runtime(&second, &other));
 }
 
@@ -296,7 +296,7 @@ TEST(test_lock_with_every_name_held_excludes_by_its_file) {
         return;
     }
     TEST_ASSERT_EQUAL_INT(0, in_process_of(STRANGER, squat_everything));
-    TEST_ASSERT_EQUAL_INT_MESSAGE(0, open_runtime(&first, &one), said);
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, open_runtime(&first, &one), logged);
     TEST_ASSERT_EQUAL_INT(EX_UNAVAILABLE, open_runtime(&second, &other));
     assert_said_pid(getpid());
 }
@@ -314,9 +314,9 @@ TEST(test_lock_without_its_file_excludes_by_the_next_name) {
     }
     spoil_shared();
     TEST_ASSERT_EQUAL_INT(0, in_process_of(STRANGER, squat_listening));
-    TEST_ASSERT_EQUAL_INT_MESSAGE(0, open_runtime(&first, &one), said);
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, "cannot be locked (Not a directory)"), said);
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, "is detected by its name only"), said);
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, open_runtime(&first, &one), logged);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(logged, "cannot be locked (Not a directory)"), logged);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(logged, "is detected by its name only"), logged);
     TEST_ASSERT_EQUAL_INT(1, first.lock.names.place);
     TEST_ASSERT_EQUAL_INT(EX_UNAVAILABLE, open_runtime(&second, &other));
     assert_said_pid(getpid());
@@ -328,7 +328,7 @@ TEST(test_lock_at_a_later_name_excludes_after_the_first_is_free) {
     }
     spoil_shared();
     TEST_ASSERT_EQUAL_INT(0, in_process_of(STRANGER, squat_listening));
-    TEST_ASSERT_EQUAL_INT_MESSAGE(0, open_runtime(&first, &one), said);
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, open_runtime(&first, &one), logged);
     end_child();
     TEST_ASSERT_EQUAL_INT(EX_UNAVAILABLE,
                           open_runtime(&second, &other)); // The place of `second` is earlier: it waits, then fails.
@@ -351,8 +351,8 @@ TEST(test_lock_of_local_bus_with_held_file_excludes) {
     TEST_ASSERT_EQUAL_INT(0, in_process_of(STRANGER, hold_file));
     TEST_ASSERT_EQUAL_INT(0, chown(top, 0, 0));
     TEST_ASSERT_EQUAL_INT(0, chmod(top, 01777));
-    TEST_ASSERT_EQUAL_INT_MESSAGE(0, open_runtime(&first, &one), said);
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, "of user 65534 holds"), said);
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, open_runtime(&first, &one), logged);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(logged, "of user 65534 holds"), logged);
     TEST_ASSERT_EQUAL_INT(EX_UNAVAILABLE, open_runtime(&second, &other));
 }
 
@@ -390,7 +390,7 @@ TEST(test_lock_held_by_the_service_excludes_all_other_users) {
 }
 
 static int go[2];
-static int told[2];
+static int ready[2];
 
 /// Gateway of a developer: reports whether it is alone, polls the lock again on request, and reports the holder to
 /// which it gives way.
@@ -400,14 +400,14 @@ static int open_and_tend(void) {
     char byte = '\0';
     if (process == 0) {
         const bool alone = !gw_bus_lock_poll(&second.lock, 0);
-        (void)!write(told[1], "", 1);
+        (void)!write(ready[1], "", 1);
         (void)!read(go[0], &byte, 1);
         const bool gives_way = gw_bus_lock_poll(&second.lock, GW_BUS_LOCK_LOOK_US);
         const gw_holder_t holder = (alone && gives_way) ? second.lock.holder : (gw_holder_t){.uid = (uid_t)-1};
-        (void)!write(told[1], &holder, sizeof holder);
+        (void)!write(ready[1], &holder, sizeof holder);
         _exit(0);
     }
-    return (read(told[0], &byte, 1) == 1) ? result : -1;
+    return (read(ready[0], &byte, 1) == 1) ? result : -1;
 }
 
 TEST(test_lock_held_by_another_user_is_given_up_to_root) {
@@ -416,18 +416,18 @@ TEST(test_lock_held_by_another_user_is_given_up_to_root) {
         return;
     }
     TEST_ASSERT_EQUAL_INT(0, pipe(go));
-    TEST_ASSERT_EQUAL_INT(0, pipe(told));
+    TEST_ASSERT_EQUAL_INT(0, pipe(ready));
     TEST_ASSERT_EQUAL_INT(0, in_process_of(STRANGER, open_and_tend));
-    TEST_ASSERT_EQUAL_INT_MESSAGE(0, open_runtime(&first, &one), said);
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, "of user 65534"), said);
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, open_runtime(&first, &one), logged);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(logged, "of user 65534"), logged);
     TEST_ASSERT_EQUAL_INT(1, write(go[1], "", 1));
-    TEST_ASSERT_EQUAL_INT(sizeof holder, read(told[0], &holder, sizeof holder));
+    TEST_ASSERT_EQUAL_INT(sizeof holder, read(ready[0], &holder, sizeof holder));
     TEST_ASSERT_EQUAL_INT(0, holder.uid);
     TEST_ASSERT_EQUAL_INT(getpid(), holder.pid);
-    TEST_ASSERT_FALSE_MESSAGE(gw_bus_lock_poll(&first.lock, GW_BUS_LOCK_LOOK_US), "root gives way to nobody");
+    TEST_ASSERT_FALSE_MESSAGE(gw_bus_lock_poll(&first.lock, GW_BUS_LOCK_LOOK_US), "root yields to no other gateway");
     for (size_t i = 0; i < 2U; i++) {
         (void)close(go[i]);
-        (void)close(told[i]);
+        (void)close(ready[i]);
     }
 }
 
@@ -504,5 +504,5 @@ TEST(test_marker_of_another_user_is_ignored) {
     TEST_ASSERT_FALSE(gw_runtime_crashed(&first));
     TEST_ASSERT_TRUE(gw_runtime_mark(&first, true));
     TEST_ASSERT_EQUAL_INT(0, lstat(first.marker_path, &status));
-    TEST_ASSERT_EQUAL_UINT32_MESSAGE(0, status.st_uid, "he could take his own away again");
+    TEST_ASSERT_EQUAL_UINT32_MESSAGE(0, status.st_uid, "the user could remove the file again");
 }

@@ -75,12 +75,12 @@ static void step(iw_time_us_t now_us) {
     gw_tape_step_end(&tape);
 }
 
-static void look(void) {
+static void read_ring(void) {
     (void)blackbox_ring_copy(ring, 0, UINT64_MAX, entries, &count);
 }
 
 static void expect_kinds(const uint8_t *kinds, size_t expected) {
-    look();
+    read_ring();
     TEST_ASSERT_EQUAL_size_t(expected, count);
     for (size_t i = 0; i < expected; i++) {
         TEST_ASSERT_EQUAL(kinds[i], entries[i].kind);
@@ -136,7 +136,7 @@ TEST(test_tape_only_a_failed_send_is_recorded) {
     send_answer = -1;
     TEST_ASSERT_EQUAL(-1, hal.send(hal.context, &frame, 1));
     TEST_ASSERT_EQUAL(1, hal.purge(hal.context));
-    look();
+    read_ring();
     TEST_ASSERT_EQUAL_size_t(2, count);
     TEST_ASSERT_EQUAL(BLACKBOX_NOT_SENT, entries[0].kind);
     TEST_ASSERT_EQUAL(266, entries[0].number);
@@ -152,7 +152,7 @@ TEST(test_tape_first_refused_frame_of_a_pair_is_recorded) {
         send_answer = answers[i];
         TEST_ASSERT_EQUAL(answers[i], hal.send(hal.context, pair, 2));
     }
-    look();
+    read_ring();
     TEST_ASSERT_EQUAL_size_t(3, count);
     TEST_ASSERT_EQUAL_UINT32(298, entries[0].number);
     TEST_ASSERT_EQUAL_INT64(0, entries[0].as.value);
@@ -182,7 +182,7 @@ TEST(test_tape_drive_has_the_request_and_its_age) {
     const iw_drive_t request = {.speed_mm_s = {300, -2147483647}, .current_mA = {100000, -100000}, .has_current = true};
     const blackbox_entry_t entry = {.at_us = 1000, .number = 7, .b = IW_REFUSE_BUSY};
     gw_tape_drive(&tape, &entry, &request, 400);
-    look();
+    read_ring();
     TEST_ASSERT_EQUAL(BLACKBOX_DRIVE, entries[0].kind);
     TEST_ASSERT_EQUAL(7, entries[0].number);
     TEST_ASSERT_EQUAL(IW_REFUSE_BUSY, entries[0].b);

@@ -14,7 +14,7 @@
 #define SOON_US  20000U
 #define LATER_US 3600000000U
 #define TAG      7U
-#define ROOM     4
+#define MAX      4
 
 static sock_wakeup_t wakeup;
 static bool asks_only; // A long wait stores its time and does not wait.
@@ -34,8 +34,8 @@ void tearDown(void) {
 }
 
 static int wait_until(iw_time_us_t until_us) {
-    struct epoll_event events[ROOM];
-    const int count = sock_wakeup_wait(&wakeup, events, ROOM, 0U, until_us);
+    struct epoll_event events[MAX];
+    const int count = sock_wakeup_wait(&wakeup, events, MAX, 0U, until_us);
     if (count == 1) {
         TEST_ASSERT_EQUAL_UINT64(TAG, events[0].data.u64);
     }
@@ -65,9 +65,9 @@ static void check_wakes_at_its_time_and_not_before(void) {
 }
 
 static void check_time_that_was_read_before_is_not_read_again(void) {
-    struct epoll_event events[ROOM];
+    struct epoll_event events[MAX];
     const iw_time_us_t due_us = in_us(SOON_US);
-    TEST_ASSERT_EQUAL_INT(0, sock_wakeup_wait(&wakeup, events, ROOM, LATER_US, LATER_US + SOON_US));
+    TEST_ASSERT_EQUAL_INT(0, sock_wakeup_wait(&wakeup, events, MAX, LATER_US, LATER_US + SOON_US));
     TEST_ASSERT_GREATER_OR_EQUAL_UINT64(due_us, iwl_clock_now_us());
 }
 

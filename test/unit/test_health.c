@@ -8,19 +8,19 @@
 
 #include <string.h>
 
-static iw_codec_wheel_t told[IW_SIDES];
+static iw_codec_wheel_t telemetry[IW_SIDES];
 static iw_snapshot_t seen;
 static gw_health_t health;
 
 void setUp(void) {
     memset(&seen, 0, sizeof seen);
-    memset(told, 0, sizeof told);
+    memset(telemetry, 0, sizeof telemetry);
     health = (gw_health_t){.limits = {.battery_low_dV = 220, .temperature_high_degC = 60}};
     seen.at_us = 10000000U;
     for (unsigned side = 0; side < IW_SIDES; side++) {
-        seen.wheel[side].told = &told[side];
-        told[side].status.battery_dV = 220;
-        told[side].status.temperature_degC = 60;
+        seen.wheel[side].told = &telemetry[side];
+        telemetry[side].status.battery_dV = 220;
+        telemetry[side].status.temperature_degC = 60;
     }
 }
 
@@ -39,8 +39,8 @@ TEST(test_health_at_the_thresholds_is_no_fault) {
 }
 
 TEST(test_health_value_beyond_for_5_s_is_a_fault_of_its_wheel) {
-    told[IW_LEFT].status.battery_dV = 219;
-    told[IW_RIGHT].status.temperature_degC = 61;
+    telemetry[IW_LEFT].status.battery_dV = 219;
+    telemetry[IW_RIGHT].status.temperature_degC = 61;
     step(0);
     step(GW_HEALTH_US - 1U);
     TEST_ASSERT_EQUAL_UINT32(0, health.changes);
@@ -53,10 +53,10 @@ TEST(test_health_value_beyond_for_5_s_is_a_fault_of_its_wheel) {
 }
 
 TEST(test_health_fault_ends_after_5_s_within_the_thresholds) {
-    told[IW_LEFT].status.battery_dV = 100;
+    telemetry[IW_LEFT].status.battery_dV = 100;
     step(0);
     step(GW_HEALTH_US);
-    told[IW_LEFT].status.battery_dV = 220;
+    telemetry[IW_LEFT].status.battery_dV = 220;
     step(1000);
     step(GW_HEALTH_US - 1U);
     TEST_ASSERT_TRUE(health.present[IW_LEFT][GW_BATTERY_LOW]);
@@ -66,12 +66,12 @@ TEST(test_health_fault_ends_after_5_s_within_the_thresholds) {
 }
 
 TEST(test_health_good_value_in_between_restarts_the_time) {
-    told[IW_LEFT].status.battery_dV = 100;
+    telemetry[IW_LEFT].status.battery_dV = 100;
     step(0);
     step(GW_HEALTH_US - 1U);
-    told[IW_LEFT].status.battery_dV = 230;
+    telemetry[IW_LEFT].status.battery_dV = 230;
     step(1);
-    told[IW_LEFT].status.battery_dV = 100;
+    telemetry[IW_LEFT].status.battery_dV = 100;
     step(1);
     step(GW_HEALTH_US - 1U);
     TEST_ASSERT_EQUAL_UINT32(0, health.changes);
@@ -81,16 +81,16 @@ TEST(test_health_good_value_in_between_restarts_the_time) {
 
 TEST(test_health_without_thresholds_reports_no_fault) {
     health.limits = (gw_health_limits_t){0, 0};
-    told[IW_LEFT].status.battery_dV = 0;
-    told[IW_LEFT].status.temperature_degC = 200;
+    telemetry[IW_LEFT].status.battery_dV = 0;
+    telemetry[IW_LEFT].status.temperature_degC = 200;
     step(0);
     step(GW_HEALTH_US);
     TEST_ASSERT_EQUAL_UINT32(0, health.changes);
 }
 
 TEST(test_health_unknown_value_changes_nothing) {
-    told[IW_LEFT].status.battery_dV = 100;
-    told[IW_RIGHT].status.temperature_degC = IW_TEMPERATURE_MAX_degC + 1U;
+    telemetry[IW_LEFT].status.battery_dV = 100;
+    telemetry[IW_RIGHT].status.temperature_degC = IW_TEMPERATURE_MAX_degC + 1U;
     step(0);
     seen.wheel[IW_LEFT].status_us = seen.at_us;
     seen.at_us += GW_HEALTH_FRESH_US + 1U;
@@ -108,8 +108,8 @@ TEST(test_health_unknown_value_changes_nothing) {
 
 TEST(test_health_sentences_name_wheel_value_and_threshold) {
     char text[128];
-    told[IW_LEFT].status.battery_dV = 219;
-    told[IW_RIGHT].status.temperature_degC = 61;
+    telemetry[IW_LEFT].status.battery_dV = 219;
+    telemetry[IW_RIGHT].status.temperature_degC = 61;
     step(0);
     gw_health_sentence(&health, &seen, IW_LEFT, GW_BATTERY_LOW, text);
     TEST_ASSERT_EQUAL_STRING("the left wheel's battery has 219 dV, below battery_low_dV 220; charge it", text);

@@ -7,24 +7,25 @@
 #include <string.h>
 
 static inspect_findings_t findings;
-static inspect_heard_t heard;
+static inspect_heard_t received;
 static const iwl_bus_link_t local = {.presence = IWL_LINK_LOCAL, .is_virtual = true, .echo_proven = true};
 static const inspect_config_t config = {
     .name = "can0", .bitrate_hz = 1000000, .sample_point_permille = 625, .refuses = true};
 
 void setUp(void) {
     inspect_begin(&findings);
-    inspect_heard_begin(&heard);
+    inspect_heard_begin(&received);
 }
 
 /// Receives two seconds of a healthy pair.
 static void hear_healthy(void) {
-    heard.was_up = true;
-    heard.span_us = 2000000U;
+    received.was_up = true;
+    received.span_us = 2000000U;
     for (unsigned i = 0; i < IW_CODEC_ROWS; i++) {
-        heard.count[i] = inspect_always(&iw_codec_rows[i]) ? inspect_nominal_mHz(&iw_codec_rows[i]) * 2U / 1000U : 0U;
+        received.count[i] =
+            inspect_always(&iw_codec_rows[i]) ? inspect_nominal_mHz(&iw_codec_rows[i]) * 2U / 1000U : 0U;
     }
-    heard.bits = 120000U;
+    received.bits = 120000U;
 }
 
 static const inspect_finding_t *find(const char *check) {
@@ -36,18 +37,18 @@ static const inspect_finding_t *find(const char *check) {
     return NULL;
 }
 
-static void expect(const char *check, inspect_verdict_t verdict, const char *text, const char *cure) {
+static void expect(const char *check, inspect_verdict_t verdict, const char *text, const char *fix) {
     const inspect_finding_t *finding = find(check);
     TEST_ASSERT_NOT_NULL_MESSAGE(finding, check);
     TEST_ASSERT_EQUAL_MESSAGE(verdict, finding->verdict, finding->text);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(finding->text, text), finding->text);
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(finding->cure, cure), finding->cure);
-    TEST_ASSERT_EQUAL_MESSAGE(verdict == INSPECT_OK, finding->cure[0] == '\0', "every trouble has a cure");
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(finding->cure, fix), finding->cure);
+    TEST_ASSERT_EQUAL_MESSAGE(verdict == INSPECT_OK, finding->cure[0] == '\0', "every finding has a fix");
 }
 
 TEST(test_inspect_healthy_bus_has_no_finding) {
     hear_healthy();
-    inspect_bus(&local, &heard, &config, &findings);
+    inspect_bus(&local, &received, &config, &findings);
     expect("left_wheel", INSPECT_OK, "speed 250.0/s, status 25.0/s, force 20.0/s", "");
     expect("right_wheel", INSPECT_OK, "pose 25.0/s", "");
     expect("load", INSPECT_OK, "6.0 %", "");
@@ -57,9 +58,9 @@ TEST(test_inspect_healthy_bus_has_no_finding) {
 TEST(test_inspect_offline_wheel_fails_without_finding_of_rates) {
     hear_healthy();
     for (unsigned i = 0; i < IW_CODEC_ROWS; i++) {
-        heard.count[i] = (iw_codec_rows[i].side == IW_RIGHT) ? 0U : heard.count[i];
+        received.count[i] = (iw_codec_rows[i].side == IW_RIGHT) ? 0U : received.count[i];
     }
-    inspect_bus(&local, &heard, &config, &findings);
+    inspect_bus(&local, &received, &config, &findings);
     expect("right_wheel", INSPECT_FAIL, "right wheel: no telemetry for 2000 ms", "power, cable");
     TEST_ASSERT_NULL(find("rates"));
     expect("left_wheel", INSPECT_OK, "left wheel", "");
@@ -67,34 +68,34 @@ TEST(test_inspect_offline_wheel_fails_without_finding_of_rates) {
 
 TEST(test_inspect_rate_off_by_over_10_percent_warns_with_numbers) {
     hear_healthy();
-    heard.count[inspect_message_of(IW_ID_LEFT_SPEED)] = 236U;
-    inspect_bus(&local, &heard, &config, &findings);
+    received.count[inspect_message_of(IW_ID_LEFT_SPEED)] = 236U;
+    inspect_bus(&local, &received, &config, &findings);
     expect("rates", INSPECT_WARN, "left speed 256 (0x100): 118.0 a second; the document has 250.0", "termination");
     TEST_ASSERT_EQUAL_UINT(1U, findings.total[INSPECT_WARN]);
 }
 
 TEST(test_inspect_rate_within_10_percent_or_two_frames_is_ok) {
     hear_healthy();
-    heard.count[inspect_message_of(IW_ID_LEFT_SPEED)] = 450U;
-    heard.count[inspect_message_of(IW_ID_RIGHT_FORCE)] = 34U;
-    inspect_bus(&local, &heard, &config, &findings);
+    received.count[inspect_message_of(IW_ID_LEFT_SPEED)] = 450U;
+    received.count[inspect_message_of(IW_ID_RIGHT_FORCE)] = 34U;
+    inspect_bus(&local, &received, &config, &findings);
     TEST_ASSERT_NULL(find("rates"));
-    heard.count[inspect_message_of(IW_ID_LEFT_SPEED)] = 447U;
-    inspect_bus(&local, &heard, &config, &findings);
+    received.count[inspect_message_of(IW_ID_LEFT_SPEED)] = 447U;
+    inspect_bus(&local, &received, &config, &findings);
     TEST_ASSERT_NOT_NULL(find("rates"));
 }
 
 TEST(test_inspect_missing_message_is_named) {
     hear_healthy();
-    heard.count[inspect_message_of(IW_ID_RIGHT_POSE)] = 0U;
-    inspect_bus(&local, &heard, &config, &findings);
+    received.count[inspect_message_of(IW_ID_RIGHT_POSE)] = 0U;
+    inspect_bus(&local, &received, &config, &findings);
     expect("rates", INSPECT_WARN, "right pose 290 (0x122): none received", "firmware");
 }
 
 TEST(test_inspect_offsets_may_be_missing_after_a_minute) {
     hear_healthy();
-    TEST_ASSERT_EQUAL_UINT32(0U, heard.count[inspect_message_of(IW_ID_LEFT_OFFSET)]);
-    inspect_bus(&local, &heard, &config, &findings);
+    TEST_ASSERT_EQUAL_UINT32(0U, received.count[inspect_message_of(IW_ID_LEFT_OFFSET)]);
+    inspect_bus(&local, &received, &config, &findings);
     TEST_ASSERT_NULL(find("rates"));
 }
 
@@ -102,29 +103,29 @@ TEST(test_inspect_foreign_setpoints_fail_without_a_gateway) {
     inspect_config_t beside_gateway = config;
     beside_gateway.others_may_send = true;
     hear_healthy();
-    heard.count[inspect_message_of(IW_ID_RIGHT_SETPOINT)] = 3U;
-    inspect_bus(&local, &heard, &beside_gateway, &findings);
+    received.count[inspect_message_of(IW_ID_RIGHT_SETPOINT)] = 3U;
+    inspect_bus(&local, &received, &beside_gateway, &findings);
     TEST_ASSERT_NULL(find("second_master"));
-    inspect_bus(&local, &heard, &config, &findings);
+    inspect_bus(&local, &received, &config, &findings);
     expect("second_master", INSPECT_FAIL, "3 frames with id 266 (0x10A) or 298 (0x12A)", "switch it off");
 }
 
 TEST(test_inspect_unknown_ids_are_listed_up_to_a_limit) {
     iw_can_frame_t frame = {.id = 0x266U};
     hear_healthy();
-    inspect_heard_take(&heard, &frame);
-    inspect_heard_take(&heard, &frame);
+    inspect_heard_take(&received, &frame);
+    inspect_heard_take(&received, &frame);
     frame.id = 0x1ABCDEF0U | IW_CAN_EXTENDED;
-    inspect_heard_take(&heard, &frame);
-    inspect_bus(&local, &heard, &config, &findings);
+    inspect_heard_take(&received, &frame);
+    inspect_bus(&local, &received, &config, &findings);
     expect("unknown_ids", INSPECT_WARN, "3 frames do not belong to the wheels: 0x266 0x1ABCDEF0",
            "iwheelctl record - --can can0 --for 2s | iwheelctl decode");
     for (uint32_t id = 1; id <= 20U; id++) {
         frame.id = id;
-        inspect_heard_take(&heard, &frame);
+        inspect_heard_take(&received, &frame);
     }
     inspect_begin(&findings);
-    inspect_bus(&local, &heard, &config, &findings);
+    inspect_bus(&local, &received, &config, &findings);
     expect("unknown_ids", INSPECT_WARN, "23 frames", "");
     TEST_ASSERT_NOT_NULL(strstr(find("unknown_ids")->text, " ..."));
 }
@@ -133,57 +134,57 @@ TEST(test_inspect_damaged_frames_have_their_own_counts) {
     const iw_can_frame_t brief = {.id = IW_ID_LEFT_SPEED, .dlc = 3};
     const iw_can_frame_t remote = {.id = IW_ID_LEFT_SPEED | IW_CAN_REMOTE, .dlc = 4};
     const iw_can_frame_t echo = {.id = IW_ID_LEFT_SETPOINT, .dlc = 5, .kind = IW_CAN_ECHO};
-    inspect_heard_take(&heard, &brief);
-    inspect_heard_take(&heard, &remote);
-    inspect_heard_take(&heard, &echo);
-    TEST_ASSERT_EQUAL_UINT32(1U, heard.bad_length);
-    TEST_ASSERT_EQUAL_UINT32(1U, heard.bad_format);
-    TEST_ASSERT_EQUAL_UINT32(0U, heard.count[inspect_message_of(IW_ID_LEFT_SETPOINT)]);
-    TEST_ASSERT_EQUAL_UINT64(47U + 24U + 47U + 47U + 40U, heard.bits);
+    inspect_heard_take(&received, &brief);
+    inspect_heard_take(&received, &remote);
+    inspect_heard_take(&received, &echo);
+    TEST_ASSERT_EQUAL_UINT32(1U, received.bad_length);
+    TEST_ASSERT_EQUAL_UINT32(1U, received.bad_format);
+    TEST_ASSERT_EQUAL_UINT32(0U, received.count[inspect_message_of(IW_ID_LEFT_SETPOINT)]);
+    TEST_ASSERT_EQUAL_UINT64(47U + 24U + 47U + 47U + 40U, received.bits);
 }
 
 TEST(test_inspect_full_bus_warns) {
     hear_healthy();
-    heard.bits = 1100000U;
-    inspect_bus(&local, &heard, &config, &findings);
+    received.bits = 1100000U;
+    inspect_bus(&local, &received, &config, &findings);
     expect("load", INSPECT_WARN, "55.0 %", "lower ids");
 }
 
 TEST(test_inspect_bus_that_was_never_up_does_not_judge_wheels) {
     iwl_bus_link_t link = {.presence = IWL_LINK_UP};
-    inspect_bus(&link, &heard, &config, &findings);
+    inspect_bus(&link, &received, &config, &findings);
     expect("bus_state", INSPECT_FAIL, "bus-off", "ip link set can0 down; ip link set can0 up");
     TEST_ASSERT_NULL(find("left_wheel"));
     inspect_begin(&findings);
-    inspect_bus(&local, &heard, &config, &findings);
+    inspect_bus(&local, &received, &config, &findings);
     expect("interface", INSPECT_FAIL, "no simulator there", "iwheel-sim --can");
 }
 
 TEST(test_inspect_error_passive_bus_warns) {
     hear_healthy();
-    heard.worst = IW_BUS_PASSIVE;
-    inspect_bus(&local, &heard, &config, &findings);
+    received.worst = IW_BUS_PASSIVE;
+    inspect_bus(&local, &received, &config, &findings);
     expect("bus_state", INSPECT_WARN, "error passive", "termination");
 }
 
 TEST(test_inspect_bus_off_fails_and_wheels_are_not_judged) {
     const iwl_bus_link_t link = {.presence = IWL_LINK_UP};
-    heard.was_up = true; // The bus was up before it went bus-off, or before the first error frame.
-    heard.worst = IW_BUS_OFF;
-    heard.last = IW_BUS_OFF;
-    inspect_bus(&link, &heard, &config, &findings);
+    received.was_up = true; // The bus was up before it went bus-off, or before the first error frame.
+    received.worst = IW_BUS_OFF;
+    received.last = IW_BUS_OFF;
+    inspect_bus(&link, &received, &config, &findings);
     expect("bus_state", INSPECT_FAIL, "bus-off", "ip link set can0 down; ip link set can0 up");
     TEST_ASSERT_NULL(find("left_wheel"));
     inspect_begin(&findings);
-    inspect_bus(&local, &heard, &config, &findings);
+    inspect_bus(&local, &received, &config, &findings);
     expect("bus_state", INSPECT_FAIL, "bus-off", "iwheel-sim busoff off");
     TEST_ASSERT_NULL(find("left_wheel"));
 }
 
 TEST(test_inspect_past_bus_off_warns_and_wheels_are_judged) {
     hear_healthy();
-    heard.worst = IW_BUS_OFF;
-    inspect_bus(&local, &heard, &config, &findings);
+    received.worst = IW_BUS_OFF;
+    inspect_bus(&local, &received, &config, &findings);
     expect("bus_state", INSPECT_WARN, "it was bus-off", "termination");
     expect("left_wheel", INSPECT_OK, "left wheel", "");
 }

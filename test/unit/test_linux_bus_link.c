@@ -66,11 +66,11 @@ TEST(test_link_is_same_compares_interface_values_only) {
 
 /// The loopback interface has a carrier unless it is down; then the kernel returns no value.
 TEST(test_link_carrier_is_that_of_the_kernel_or_unknown) {
-    char told[8] = "";
+    char line[8] = "";
     FILE *file = fopen("/sys/class/net/lo/carrier", "r");
     TEST_ASSERT_NOT_NULL(file);
-    const bool known = fgets(told, sizeof told, file) != NULL;
+    const bool known = fgets(line, sizeof line, file) != NULL;
     (void)fclose(file);
-    TEST_ASSERT_EQUAL_INT(known ? told[0] - '0' : -1, iwl_netdev_carrier("lo"));
+    TEST_ASSERT_EQUAL_INT(known ? line[0] - '0' : -1, iwl_netdev_carrier("lo"));
     TEST_ASSERT_EQUAL_INT(-1, iwl_netdev_carrier("no-such-one"));
 }

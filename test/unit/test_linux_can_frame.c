@@ -101,13 +101,13 @@ TEST(test_translate_only_a_frame_of_our_socket_is_an_echo) {
 }
 
 TEST(test_translate_frame_longer_than_classic_is_no_telemetry) {
-    iw_codec_wheel_t told[IW_SIDES];
+    iw_codec_wheel_t decoded[IW_SIDES];
     const iw_can_frame_t frame = translate(256, 64, MSG_TRUNC);
     TEST_ASSERT_EQUAL_HEX32(256U | IW_CAN_FD, frame.id);
     TEST_ASSERT_EQUAL(8, frame.dlc);
-    TEST_ASSERT_EQUAL(IW_CODEC_BAD_FORMAT, iw_codec_decode(&frame, told));
+    TEST_ASSERT_EQUAL(IW_CODEC_BAD_FORMAT, iw_codec_decode(&frame, decoded));
     const iw_can_frame_t short_fd = translate(256, 4, MSG_TRUNC);
-    TEST_ASSERT_EQUAL(IW_CODEC_BAD_FORMAT, iw_codec_decode(&short_fd, told));
+    TEST_ASSERT_EQUAL(IW_CODEC_BAD_FORMAT, iw_codec_decode(&short_fd, decoded));
 }
 
 static iwl_can_error_t error_of(canid_t classes, uint8_t controller) {

@@ -20,7 +20,7 @@ static struct {
 static unsigned count;
 static int refused;   // The option that the kernel refuses; 0: none.
 static int come;      // Result of recvmmsg: number of frames, or a negative errno.
-static int taken;     // Most frames that sendmmsg accepts; negative: a negative errno.
+static int accepted;  // Most frames that sendmmsg accepts; negative: a negative errno.
 static size_t length; // Length that sendmmsg reports for each frame.
 static struct can_frame on_bus[IW_SIDES];
 static int calls;    // Calls of sendmmsg.
@@ -59,11 +59,11 @@ int bind(int fd, __CONST_SOCKADDR_ARG address, socklen_t size) {
     return 0;
 }
 
-int recvmmsg(int fd, struct mmsghdr *messages, unsigned room, int flags, struct timespec *timeout) {
+int recvmmsg(int fd, struct mmsghdr *messages, unsigned max, int flags, struct timespec *timeout) {
     (void)fd;
     (void)timeout;
     TEST_ASSERT_EQUAL_INT(MSG_DONTWAIT, flags);
-    TEST_ASSERT_LESS_OR_EQUAL_INT((int)room, come);
+    TEST_ASSERT_LESS_OR_EQUAL_INT((int)max, come);
     for (int i = 0; i < come; i++) {
         messages[i].msg_len = sizeof(struct can_frame);
         messages[i].msg_hdr.msg_flags = 0;
@@ -78,7 +78,7 @@ int sendmmsg(int fd, struct mmsghdr *messages, unsigned asked_frames, int flags)
     TEST_ASSERT_EQUAL_INT(MSG_DONTWAIT | MSG_NOSIGNAL, flags);
     TEST_ASSERT_LESS_OR_EQUAL_UINT(IW_SIDES, asked_frames);
     calls++;
-    const int sent = (taken < (int)asked_frames) ? taken : (int)asked_frames;
+    const int sent = (accepted < (int)asked_frames) ? accepted : (int)asked_frames;
     for (int i = 0; i < sent; i++) {
         TEST_ASSERT_EQUAL_UINT(1, messages[i].msg_hdr.msg_iovlen);
         TEST_ASSERT_EQUAL_UINT(sizeof on_bus[i], messages[i].msg_hdr.msg_iov->iov_len);
@@ -87,8 +87,8 @@ int sendmmsg(int fd, struct mmsghdr *messages, unsigned asked_frames, int flags)
         memcpy(&on_bus[i], messages[i].msg_hdr.msg_iov->iov_base, sizeof on_bus[i]);
         messages[i].msg_len = (unsigned)length;
     }
-    errno = (taken < 0) ? -taken : before;
-    return (taken < 0) ? -1 : sent;
+    errno = (accepted < 0) ? -accepted : before;
+    return (accepted < 0) ? -1 : sent;
 }
 
 void setUp(void) {
@@ -96,7 +96,7 @@ void setUp(void) {
     count = 0;
     refused = come = before = calls = 0;
     memset(on_bus, 0xA5, sizeof on_bus);
-    taken = IW_SIDES;
+    accepted = IW_SIDES;
     length = sizeof(struct can_frame);
     iwl_socketcan_socket_init(&bus);
 }
@@ -183,16 +183,16 @@ TEST(test_can_socket_send_separates_busy_from_bus_lost) {
     TEST_ASSERT_EQUAL_INT(1, iwl_socketcan_socket_send(&bus, pair, 1));
     static const int for_now[] = {EAGAIN, ENOBUFS, EINTR};
     for (size_t i = 0; i < sizeof for_now / sizeof for_now[0]; i++) {
-        taken = -for_now[i];
+        accepted = -for_now[i];
         TEST_ASSERT_EQUAL_INT(0, iwl_socketcan_socket_send(&bus, pair, 1));
         TEST_ASSERT_EQUAL_INT(0, iwl_socketcan_socket_send(&bus, pair, IW_SIDES));
     }
-    taken = -ENETDOWN;
+    accepted = -ENETDOWN;
     TEST_ASSERT_EQUAL_INT(-1, iwl_socketcan_socket_send(&bus, pair, IW_SIDES));
-    taken = 0; // No frame. The errno of an earlier call has no meaning.
+    accepted = 0; // No frame. The errno of an earlier call has no meaning.
     before = EAGAIN;
     TEST_ASSERT_EQUAL_INT(-1, iwl_socketcan_socket_send(&bus, pair, IW_SIDES));
-    taken = 1; // Less than a whole frame counts as no frame.
+    accepted = 1; // Less than a whole frame counts as no frame.
     length = sizeof(struct can_frame) - 1U;
     TEST_ASSERT_EQUAL_INT(-1, iwl_socketcan_socket_send(&bus, pair, IW_SIDES));
 }
@@ -210,7 +210,7 @@ TEST(test_can_socket_pair_is_sent_in_one_call_left_first) {
 
 TEST(test_can_socket_half_sent_pair_reports_one_frame) {
     TEST_ASSERT_EQUAL_INT(0, iwl_socketcan_socket_open(&bus, 3, IWL_SOCKETCAN_OURS));
-    taken = 1;
+    accepted = 1;
     before = ENOBUFS;
     TEST_ASSERT_EQUAL_INT(1, iwl_socketcan_socket_send(&bus, pair, IW_SIDES));
     TEST_ASSERT_EQUAL_INT(1, calls); // The port does not retry the second frame.

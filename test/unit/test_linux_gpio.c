@@ -66,7 +66,7 @@ TEST(test_address_with_the_longest_name_fits) {
     TEST_ASSERT_EQUAL_INT(ENAMETOOLONG, iwl_gpio_address_parse("a-line-name-of-32-letters-xxxxxx", &address));
 }
 
-static void look(uint32_t after_us, bool active, bool edge) {
+static void poll_at(uint32_t after_us, bool active, bool edge) {
     now_us += after_us;
     iwl_gpio_release_see(&release, now_us, active, edge);
 }
@@ -76,75 +76,75 @@ static bool pressed(void) {
 }
 
 TEST(test_release_line_inactive_at_start_is_released) {
-    look(0, false, false);
+    poll_at(0, false, false);
     TEST_ASSERT_FALSE(pressed());
     TEST_ASSERT_EQUAL_UINT64(IW_NEVER, iwl_gpio_release_next_us(&release, now_us));
 }
 
 TEST(test_release_press_counts_immediately) {
-    look(0, true, false);
+    poll_at(0, true, false);
     TEST_ASSERT_TRUE(pressed());
     TEST_ASSERT_EQUAL_UINT64(IW_NEVER, iwl_gpio_release_next_us(&release, now_us));
     setUp();
-    look(0, true, true);
+    poll_at(0, true, true);
     TEST_ASSERT_TRUE(pressed());
 }
 
 TEST(test_release_counts_after_the_debounce_time) {
-    look(0, true, true);
+    poll_at(0, true, true);
     (void)pressed();
-    look(1000U * MS, false, true);
+    poll_at(1000U * MS, false, true);
     TEST_ASSERT_TRUE(pressed());
     TEST_ASSERT_EQUAL_UINT64(now_us + 5U * MS, iwl_gpio_release_next_us(&release, now_us));
-    look(5U * MS - 1U, false, false);
+    poll_at(5U * MS - 1U, false, false);
     TEST_ASSERT_TRUE(pressed());
-    look(1U, false, false);
+    poll_at(1U, false, false);
     TEST_ASSERT_FALSE(pressed());
     TEST_ASSERT_EQUAL_UINT64(IW_NEVER, iwl_gpio_release_next_us(&release, now_us));
 }
 
 TEST(test_release_is_delayed_by_every_bounce) {
-    look(0, true, true);
+    poll_at(0, true, true);
     (void)pressed();
     for (unsigned bounce = 0; bounce < 20U; bounce++) {
-        look(4U * MS, (bounce & 1U) != 0U, true);
+        poll_at(4U * MS, (bounce & 1U) != 0U, true);
         TEST_ASSERT_TRUE(pressed());
     }
-    look(4U * MS, false, true);
-    look(4U * MS, false, true);
-    look(5U * MS - 1U, false, false);
+    poll_at(4U * MS, false, true);
+    poll_at(4U * MS, false, true);
+    poll_at(5U * MS - 1U, false, false);
     TEST_ASSERT_TRUE(pressed());
-    look(1U, false, false);
+    poll_at(1U, false, false);
     TEST_ASSERT_FALSE(pressed());
 }
 
 TEST(test_release_pulse_between_two_polls_is_a_press) {
-    look(0, false, false);
+    poll_at(0, false, false);
     (void)pressed();
-    look(20U * MS, false, true);
+    poll_at(20U * MS, false, true);
     TEST_ASSERT_TRUE(pressed());
-    look(5U * MS, false, false);
+    poll_at(5U * MS, false, false);
     TEST_ASSERT_FALSE(pressed());
 }
 
 TEST(test_release_edge_is_reported_once_at_a_late_read) {
-    look(0, false, true);
+    poll_at(0, false, true);
     now_us += 1000U * MS;
     TEST_ASSERT_TRUE(pressed());
     TEST_ASSERT_FALSE(pressed());
 }
 
 TEST(test_release_edge_before_a_second_poll_is_reported_once) {
-    look(0, false, true);
-    look(10U * MS, false, false);
+    poll_at(0, false, true);
+    poll_at(10U * MS, false, false);
     now_us += 1000U * MS;
     TEST_ASSERT_TRUE(pressed());
     TEST_ASSERT_FALSE(pressed());
 }
 
 TEST(test_release_short_active_level_without_edge_is_reported) {
-    look(0, true, false);
-    look(10U * MS, false, false);
+    poll_at(0, true, false);
+    poll_at(10U * MS, false, false);
     now_us += 1000U * MS;
     TEST_ASSERT_TRUE(pressed());
     TEST_ASSERT_FALSE(pressed());
@@ -152,9 +152,9 @@ TEST(test_release_short_active_level_without_edge_is_reported) {
 
 TEST(test_release_without_debounce_follows_the_level) {
     iwl_gpio_release_init(&release, 0);
-    look(0, true, true);
+    poll_at(0, true, true);
     TEST_ASSERT_TRUE(pressed());
-    look(1U, false, true);
+    poll_at(1U, false, true);
     TEST_ASSERT_TRUE(pressed());
     TEST_ASSERT_FALSE(pressed());
     TEST_ASSERT_EQUAL_UINT64(IW_NEVER, iwl_gpio_release_next_us(&release, now_us));

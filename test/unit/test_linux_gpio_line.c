@@ -28,18 +28,18 @@ const char *fake_gpio_label(void) {
     return (fake_gpio.label != NULL) ? fake_gpio.label : FAKE_GPIO_LABEL;
 }
 
-int fake_gpio_take(unsigned room) {
-    const int taken = (fake_gpio.edges < (int)room) ? fake_gpio.edges : (int)room;
+int fake_gpio_take(unsigned max) {
+    const int count = (fake_gpio.edges < (int)max) ? fake_gpio.edges : (int)max;
     fake_gpio.reads++;
-    if (taken == 0 && fake_gpio.edges_error < 0) {
+    if (count == 0 && fake_gpio.edges_error < 0) {
         return 0;
     }
-    if (taken == 0) {
+    if (count == 0) {
         errno = (fake_gpio.edges_error != 0) ? fake_gpio.edges_error : EAGAIN;
         return -1;
     }
-    fake_gpio.edges -= taken;
-    return taken;
+    fake_gpio.edges -= count;
+    return count;
 }
 
 void setUp(void) {
@@ -120,13 +120,13 @@ TEST(test_line_that_cannot_open_returns_errno_and_leaks_nothing) {
     TEST_ASSERT_EQUAL_INT(EACCES, iwl_gpio_line_open(&line, &by_name));
     TEST_ASSERT_EQUAL_INT(EACCES, iwl_gpio_line_open(&line, &by_offset));
     fake_gpio.chip_error = 0;
-    const iwl_gpio_address_t nobody = {.name = "NOBODY"};
+    const iwl_gpio_address_t unknown = {.name = "NOBODY"};
     const iwl_gpio_address_t nowhere = {.name = "gpiochip9", .offset = FAKE_GPIO_OFFSET, .by_offset = true};
-    TEST_ASSERT_EQUAL_INT(ENOENT, iwl_gpio_line_open(&line, &nobody));
+    TEST_ASSERT_EQUAL_INT(ENOENT, iwl_gpio_line_open(&line, &unknown));
     TEST_ASSERT_EQUAL_INT(ENOENT, iwl_gpio_line_open(&line, &nowhere));
     const iwl_gpio_address_t no_such = {.name = FAKE_GPIO_CHIP, .offset = 99, .by_offset = true};
     const int error = iwl_gpio_line_open(&line, &no_such);
-    TEST_ASSERT_TRUE_MESSAGE(error == ENOENT || error == EINVAL, "as the library says it");
+    TEST_ASSERT_TRUE_MESSAGE(error == ENOENT || error == EINVAL, "with the library's error");
     TEST_ASSERT_EQUAL_INT(0, fake_gpio.open);
     TEST_ASSERT_EQUAL_INT(-1, line.fd);
 }
@@ -200,8 +200,8 @@ TEST(test_line_lookup_returns_names_without_a_request) {
     fake_gpio.unnamed = false;
     fake_gpio.twin = 2;
     TEST_ASSERT_EQUAL_INT(ENOTUNIQ, iwl_gpio_line_see(&by_name, &seen));
-    const iwl_gpio_address_t nobody = {.name = "NOBODY"};
-    TEST_ASSERT_EQUAL_INT(ENOENT, iwl_gpio_line_see(&nobody, &seen));
+    const iwl_gpio_address_t unknown = {.name = "NOBODY"};
+    TEST_ASSERT_EQUAL_INT(ENOENT, iwl_gpio_line_see(&unknown, &seen));
     TEST_ASSERT_EQUAL_INT(0, fake_gpio.open);
 }
 

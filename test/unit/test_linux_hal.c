@@ -40,12 +40,12 @@ static void bus_tend(iwl_bus_t *self) {
 }
 
 static const iwl_bus_kind_t bus_kind = {.close = bus_tend, .poll = bus_tend};
-static unsigned tended;
+static unsigned polled;
 static unsigned closed;
 
 static void fake_tend(void *self, iw_time_us_t now_us) {
     (void)now_us;
-    tended += (self == &hal.estop2) ? 10U : 1U;
+    polled += (self == &hal.estop2) ? 10U : 1U;
 }
 
 static void fake_close(void *self) {
@@ -66,38 +66,38 @@ void setUp(void) {
     answer = 0;
 }
 
-static int look(void) {
+static int read_estop(void) {
     return iwl_hal_pressed(&hal);
 }
 
 TEST(test_hal_estop_without_a_wait_is_read_fully) {
-    (void)look();
+    (void)read_estop();
     TEST_ASSERT_FALSE(was_quiet);
 }
 
 TEST(test_hal_estop_not_reported_by_the_wait_has_no_edges) {
     iwl_hal_waited(&hal, (iwl_reported_t){false, false});
-    (void)look();
+    (void)read_estop();
     TEST_ASSERT_TRUE(was_quiet);
 }
 
 TEST(test_hal_estop_reported_by_the_wait_is_read_fully) {
     iwl_hal_waited(&hal, (iwl_reported_t){false, false});
     iwl_hal_waited(&hal, (iwl_reported_t){false, true});
-    (void)look();
+    (void)read_estop();
     TEST_ASSERT_FALSE(was_quiet);
 }
 
 TEST(test_hal_wait_counts_for_one_read) {
     iwl_hal_waited(&hal, (iwl_reported_t){false, false});
-    (void)look();
-    (void)look();
+    (void)read_estop();
+    (void)read_estop();
     TEST_ASSERT_FALSE(was_quiet);
 }
 
 TEST(test_hal_last_result_is_stored) {
     answer = 1;
-    TEST_ASSERT_EQUAL_INT(1, look());
+    TEST_ASSERT_EQUAL_INT(1, read_estop());
     TEST_ASSERT_EQUAL_INT(1, hal.estop_last);
 }
 
@@ -176,26 +176,26 @@ TEST(test_hal_second_contact_with_too_long_names_is_refused) {
 TEST(test_hal_second_contact_is_read_at_any_value_of_the_first) {
     set_up_two();
     answer = 1;
-    TEST_ASSERT_EQUAL_INT(1, look());
+    TEST_ASSERT_EQUAL_INT(1, read_estop());
     TEST_ASSERT_EQUAL_UINT(11, reads);
     TEST_ASSERT_EQUAL_INT(1, hal.contact_last[0]);
     TEST_ASSERT_EQUAL_INT(0, hal.contact_last[1]);
     answer = 0;
     answer2 = 1;
-    TEST_ASSERT_EQUAL_INT(1, look());
+    TEST_ASSERT_EQUAL_INT(1, read_estop());
     TEST_ASSERT_EQUAL_INT(1, hal.contact_last[1]);
     answer2 = 0;
-    TEST_ASSERT_EQUAL_INT(0, look());
+    TEST_ASSERT_EQUAL_INT(0, read_estop());
     answer2 = -1;
-    TEST_ASSERT_EQUAL_INT(-1, look());
+    TEST_ASSERT_EQUAL_INT(-1, read_estop());
 }
 
 TEST(test_hal_contacts_are_judged_at_the_time_of_the_poll) {
     set_up_two();
     answer2 = 1;
-    TEST_ASSERT_EQUAL_INT(1, look());
+    TEST_ASSERT_EQUAL_INT(1, read_estop());
     iwl_hal_poll(&hal, 1200001U);
-    TEST_ASSERT_EQUAL_INT(IW_ESTOP_DISAGREES, look());
+    TEST_ASSERT_EQUAL_INT(IW_ESTOP_DISAGREES, read_estop());
     TEST_ASSERT_EQUAL_INT(IW_ESTOP_DISAGREES, hal.estop_last);
 }
 
@@ -204,12 +204,12 @@ TEST(test_hal_each_contact_is_waited_for_polled_and_reported) {
     TEST_ASSERT_EQUAL_INT(-1, iwl_hal_estop2_fd(&hal));
     TEST_ASSERT_EQUAL_INT(1, iwl_hal_estop_trouble(&hal, 0));
     TEST_ASSERT_EQUAL_INT(0, iwl_hal_estop_trouble(&hal, 1));
-    tended = 0;
+    polled = 0;
     iwl_hal_poll(&hal, 1);
-    TEST_ASSERT_EQUAL_UINT(1, tended);
+    TEST_ASSERT_EQUAL_UINT(1, polled);
     set_up_two();
     iwl_hal_poll(&hal, 2);
-    TEST_ASSERT_EQUAL_UINT(12, tended);
+    TEST_ASSERT_EQUAL_UINT(12, polled);
     TEST_ASSERT_EQUAL_INT(10, iwl_hal_estop_fd(&hal));
     TEST_ASSERT_EQUAL_INT(20, iwl_hal_estop2_fd(&hal));
     TEST_ASSERT_EQUAL_INT(1, iwl_hal_estop_trouble(&hal, 0));
@@ -234,7 +234,7 @@ TEST(test_hal_next_time_is_the_earliest_of_bus_and_both_contacts) {
     set_up_two();
     TEST_ASSERT_EQUAL_UINT64(3000000, iwl_hal_next_us(&hal));
     answer2 = 1;
-    (void)look();
+    (void)read_estop();
     TEST_ASSERT_EQUAL_UINT64(1200001, iwl_hal_next_us(&hal));
     estop_due_us = 1100000;
     TEST_ASSERT_EQUAL_UINT64(1100000, iwl_hal_next_us(&hal));

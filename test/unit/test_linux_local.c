@@ -54,7 +54,7 @@ static int receive(iw_can_frame_t *out_frame) {
     return iwl_bus_receive(&hal.bus, out_frame);
 }
 
-static void tell(uint32_t id, uint8_t dlc, uint8_t mark, uint8_t fill) {
+static void send_frame(uint32_t id, uint8_t dlc, uint8_t mark, uint8_t fill) {
     struct can_frame raw = {.can_id = id, .len = dlc};
     raw.__res0 = mark;
     memset(raw.data, fill, sizeof raw.data);
@@ -92,34 +92,34 @@ void tearDown(void) {
 static void test_local_frame_is_sent_unchanged_and_its_echo_has_the_mark(void) {
     const iw_can_frame_t frame = {.id = 266, .dlc = 5, .data = {1, 2, 3, 4, 5}};
     struct can_frame raw;
-    iw_can_frame_t heard;
+    iw_can_frame_t received;
     TEST_ASSERT_TRUE(iwl_bus_send(&hal.bus, &frame, 1) > 0);
     TEST_ASSERT_EQUAL_INT((int)sizeof raw, (int)recv(hub, &raw, sizeof raw, 0));
     TEST_ASSERT_EQUAL_HEX32(266, raw.can_id);
     TEST_ASSERT_EQUAL_UINT8(5, raw.len);
     TEST_ASSERT_EQUAL_UINT8(0, raw.__res0);
     TEST_ASSERT_EQUAL_MEMORY(frame.data, raw.data, 8);
-    TEST_ASSERT_EQUAL_INT(0, receive(&heard));
-    tell(266, 5, 1, 9);
-    tell(266, 5, 0, 9);
+    TEST_ASSERT_EQUAL_INT(0, receive(&received));
+    send_frame(266, 5, 1, 9);
+    send_frame(266, 5, 0, 9);
     TEST_ASSERT_TRUE(wakes(iwl_hal_bus_fd(&hal)));
-    TEST_ASSERT_EQUAL_INT(1, receive(&heard));
-    TEST_ASSERT_EQUAL_UINT8(IW_CAN_ECHO, heard.kind);
-    TEST_ASSERT_EQUAL_INT(1, receive(&heard));
-    TEST_ASSERT_EQUAL_UINT8(IW_CAN_RECEIVED, heard.kind);
-    TEST_ASSERT_EQUAL_INT(0, receive(&heard));
+    TEST_ASSERT_EQUAL_INT(1, receive(&received));
+    TEST_ASSERT_EQUAL_UINT8(IW_CAN_ECHO, received.kind);
+    TEST_ASSERT_EQUAL_INT(1, receive(&received));
+    TEST_ASSERT_EQUAL_UINT8(IW_CAN_RECEIVED, received.kind);
+    TEST_ASSERT_EQUAL_INT(0, receive(&received));
     TEST_ASSERT_FALSE(wakes(iwl_hal_bus_fd(&hal)));
 }
 
 static void test_local_frames_of_several_batches_arrive_in_order(void) {
-    iw_can_frame_t heard;
+    iw_can_frame_t received;
     unsigned expected = 0;
     for (unsigned i = 0; i < 100; i++) {
-        tell(i, 8, 0, (uint8_t)i);
+        send_frame(i, 8, 0, (uint8_t)i);
     }
     for (unsigned tries = 0; tries < 300 && expected < 100; tries++) {
-        if (receive(&heard) > 0) {
-            TEST_ASSERT_EQUAL_HEX32(expected, heard.id);
+        if (receive(&received) > 0) {
+            TEST_ASSERT_EQUAL_HEX32(expected, received.id);
             expected++;
         }
     }
@@ -127,37 +127,37 @@ static void test_local_frames_of_several_batches_arrive_in_order(void) {
 }
 
 static void test_local_frame_formats_differ(void) {
-    iw_can_frame_t heard;
-    tell(256U | CAN_RTR_FLAG, 4, 0, 0);
-    tell(256U | CAN_EFF_FLAG, 4, 0, 0);
-    tell(0x1ABCDEFU | CAN_EFF_FLAG | CAN_RTR_FLAG, 4, 0, 0);
-    TEST_ASSERT_EQUAL_INT(1, receive(&heard));
-    TEST_ASSERT_EQUAL_HEX32(256U | IW_CAN_REMOTE, heard.id);
-    TEST_ASSERT_EQUAL_INT(1, receive(&heard));
-    TEST_ASSERT_EQUAL_HEX32(256U | IW_CAN_EXTENDED, heard.id);
-    TEST_ASSERT_EQUAL_INT(1, receive(&heard));
-    TEST_ASSERT_EQUAL_HEX32(0x1ABCDEFU | IW_CAN_EXTENDED | IW_CAN_REMOTE, heard.id);
+    iw_can_frame_t received;
+    send_frame(256U | CAN_RTR_FLAG, 4, 0, 0);
+    send_frame(256U | CAN_EFF_FLAG, 4, 0, 0);
+    send_frame(0x1ABCDEFU | CAN_EFF_FLAG | CAN_RTR_FLAG, 4, 0, 0);
+    TEST_ASSERT_EQUAL_INT(1, receive(&received));
+    TEST_ASSERT_EQUAL_HEX32(256U | IW_CAN_REMOTE, received.id);
+    TEST_ASSERT_EQUAL_INT(1, receive(&received));
+    TEST_ASSERT_EQUAL_HEX32(256U | IW_CAN_EXTENDED, received.id);
+    TEST_ASSERT_EQUAL_INT(1, receive(&received));
+    TEST_ASSERT_EQUAL_HEX32(0x1ABCDEFU | IW_CAN_EXTENDED | IW_CAN_REMOTE, received.id);
 }
 
 static void test_local_messages_of_another_size_are_ignored(void) {
-    iw_can_frame_t heard;
+    iw_can_frame_t received;
     char junk[40] = {0};
     TEST_ASSERT_EQUAL_INT(15, (int)send(hub, junk, 15, 0));
     TEST_ASSERT_EQUAL_INT(17, (int)send(hub, junk, 17, 0));
     TEST_ASSERT_EQUAL_INT(40, (int)send(hub, junk, 40, 0));
-    tell(257, 7, 0, 0);
-    TEST_ASSERT_EQUAL_INT(1, receive(&heard));
-    TEST_ASSERT_EQUAL_HEX32(257, heard.id);
-    TEST_ASSERT_EQUAL_INT(0, receive(&heard));
+    send_frame(257, 7, 0, 0);
+    TEST_ASSERT_EQUAL_INT(1, receive(&received));
+    TEST_ASSERT_EQUAL_HEX32(257, received.id);
+    TEST_ASSERT_EQUAL_INT(0, receive(&received));
 }
 
 static void test_local_hub_lost_and_back_between_reads_is_reported_once(void) {
-    iw_can_frame_t heard;
+    iw_can_frame_t received;
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, bus());
-    tell(256, 4, 0, 0);
+    send_frame(256, 4, 0, 0);
     (void)close(hub);
-    TEST_ASSERT_EQUAL_INT(1, receive(&heard)); // A frame received before the end still counts.
-    TEST_ASSERT_TRUE(receive(&heard) < 0);
+    TEST_ASSERT_EQUAL_INT(1, receive(&received)); // A frame received before the end still counts.
+    TEST_ASSERT_TRUE(receive(&received) < 0);
     iwl_hal_poll(&hal, now_us); // The port reconnects immediately.
     hub = accept(bus_listener, NULL, NULL);
     TEST_ASSERT_TRUE(hub >= 0);
@@ -167,26 +167,26 @@ static void test_local_hub_lost_and_back_between_reads_is_reported_once(void) {
 
 static void test_local_half_read_batch_is_dropped_when_the_hub_is_lost(void) {
     const iw_can_frame_t frame = {.id = 266, .dlc = 5};
-    iw_can_frame_t heard;
+    iw_can_frame_t received;
     for (unsigned i = 0; i < 10; i++) {
-        tell(256, 4, 0, 0);
+        send_frame(256, 4, 0, 0);
     }
-    TEST_ASSERT_EQUAL_INT(1, receive(&heard));
+    TEST_ASSERT_EQUAL_INT(1, receive(&received));
     (void)close(hub);
     TEST_ASSERT_TRUE(iwl_bus_send(&hal.bus, &frame, 1) < 0);
     iwl_hal_poll(&hal, now_us); // The port reconnects immediately.
     hub = accept(bus_listener, NULL, NULL);
     TEST_ASSERT_TRUE(hub >= 0);
-    TEST_ASSERT_EQUAL_INT(0, receive(&heard));
+    TEST_ASSERT_EQUAL_INT(0, receive(&received));
     TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, bus());
 }
 
 static void test_local_lost_hub_is_down_and_retried_at_the_back_off(void) {
-    iw_can_frame_t heard;
+    iw_can_frame_t received;
     const iw_can_frame_t frame = {.id = 266, .dlc = 5};
     (void)close(bus_listener);
     (void)close(hub);
-    TEST_ASSERT_TRUE(receive(&heard) < 0);
+    TEST_ASSERT_TRUE(receive(&received) < 0);
     unsigned attempts = 0;
     for (unsigned i = 0; i < 1000; i++) { // One second, with a poll every millisecond.
         const iw_time_us_t before_us = iwl_hal_next_us(&hal);
@@ -196,7 +196,7 @@ static void test_local_lost_hub_is_down_and_retried_at_the_back_off(void) {
         TEST_ASSERT_TRUE(iwl_hal_next_us(&hal) <= now_us + 200000U);
         TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, bus());
         TEST_ASSERT_TRUE(iwl_bus_send(&hal.bus, &frame, 1) < 0);
-        TEST_ASSERT_TRUE(receive(&heard) < 0);
+        TEST_ASSERT_TRUE(receive(&received) < 0);
         now_us += 1000;
     }
     TEST_ASSERT_TRUE(attempts >= 5 && attempts <= 10);
@@ -210,49 +210,49 @@ static void test_local_lost_hub_is_down_and_retried_at_the_back_off(void) {
 }
 
 static void test_local_error_frames_change_only_the_state(void) {
-    iw_can_frame_t heard;
+    iw_can_frame_t received;
     struct can_frame passive = {.can_id = CAN_ERR_FLAG | CAN_ERR_CRTL, .len = 8};
     passive.data[1] = CAN_ERR_CRTL_TX_PASSIVE;
     TEST_ASSERT_EQUAL_INT(16, (int)send(hub, &passive, sizeof passive, 0));
-    TEST_ASSERT_EQUAL_INT(0, receive(&heard));
+    TEST_ASSERT_EQUAL_INT(0, receive(&received));
     TEST_ASSERT_EQUAL_INT(IW_BUS_PASSIVE, bus());
-    tell(CAN_ERR_FLAG | CAN_ERR_BUSOFF, 8, 0, 0);
-    tell(CAN_ERR_FLAG | CAN_ERR_RESTARTED, 8, 0, 0);
-    TEST_ASSERT_EQUAL_INT(0, receive(&heard));
+    send_frame(CAN_ERR_FLAG | CAN_ERR_BUSOFF, 8, 0, 0);
+    send_frame(CAN_ERR_FLAG | CAN_ERR_RESTARTED, 8, 0, 0);
+    TEST_ASSERT_EQUAL_INT(0, receive(&received));
     TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, bus()); // A short bus-off is reported, too.
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, bus());
-    tell(CAN_ERR_FLAG | CAN_ERR_BUSOFF, 8, 0, 0);
-    TEST_ASSERT_EQUAL_INT(0, receive(&heard));
+    send_frame(CAN_ERR_FLAG | CAN_ERR_BUSOFF, 8, 0, 0);
+    TEST_ASSERT_EQUAL_INT(0, receive(&received));
     TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, bus());
     TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, bus());
 }
 
 static void test_local_state_frames_of_clients_cannot_end_bus_off(void) {
     static const uint32_t good[] = {CAN_ERR_FLAG | CAN_ERR_RESTARTED, CAN_ERR_FLAG | CAN_ERR_CRTL};
-    iw_can_frame_t heard;
-    tell(CAN_ERR_FLAG | CAN_ERR_BUSOFF, 8, 2, 0);
-    TEST_ASSERT_EQUAL_INT(0, receive(&heard));
+    iw_can_frame_t received;
+    send_frame(CAN_ERR_FLAG | CAN_ERR_BUSOFF, 8, 2, 0);
+    TEST_ASSERT_EQUAL_INT(0, receive(&received));
     TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, bus());
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, bus());
-    tell(CAN_ERR_FLAG | CAN_ERR_BUSOFF, 8, 0, 0);
-    TEST_ASSERT_EQUAL_INT(0, receive(&heard));
+    send_frame(CAN_ERR_FLAG | CAN_ERR_BUSOFF, 8, 0, 0);
+    TEST_ASSERT_EQUAL_INT(0, receive(&received));
     for (size_t i = 0; i < 2; i++) {
-        tell(good[i], 8, 2, CAN_ERR_CRTL_ACTIVE);
-        tell(good[i], 8, 2, CAN_ERR_CRTL_TX_PASSIVE);
-        TEST_ASSERT_EQUAL_INT(0, receive(&heard));
+        send_frame(good[i], 8, 2, CAN_ERR_CRTL_ACTIVE);
+        send_frame(good[i], 8, 2, CAN_ERR_CRTL_TX_PASSIVE);
+        TEST_ASSERT_EQUAL_INT(0, receive(&received));
         TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, bus());
     }
-    tell(CAN_ERR_FLAG | CAN_ERR_CRTL, 8, 0,
-         CAN_ERR_CRTL_ACTIVE); // The frame of the controller does not end bus-off either.
-    tell(CAN_ERR_FLAG | CAN_ERR_CRTL, 8, 0, CAN_ERR_CRTL_TX_PASSIVE);
-    TEST_ASSERT_EQUAL_INT(0, receive(&heard));
+    send_frame(CAN_ERR_FLAG | CAN_ERR_CRTL, 8, 0,
+               CAN_ERR_CRTL_ACTIVE); // The frame of the controller does not end bus-off either.
+    send_frame(CAN_ERR_FLAG | CAN_ERR_CRTL, 8, 0, CAN_ERR_CRTL_TX_PASSIVE);
+    TEST_ASSERT_EQUAL_INT(0, receive(&received));
     TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, bus());
 }
 
 static void test_local_restart_reports_a_missed_bus_off(void) {
-    iw_can_frame_t heard;
-    tell(CAN_ERR_FLAG | CAN_ERR_RESTARTED, 8, 0, 0);
-    TEST_ASSERT_EQUAL_INT(0, receive(&heard));
+    iw_can_frame_t received;
+    send_frame(CAN_ERR_FLAG | CAN_ERR_RESTARTED, 8, 0, 0);
+    TEST_ASSERT_EQUAL_INT(0, receive(&received));
     TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, bus());
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, bus());
 }
@@ -273,7 +273,7 @@ static void test_local_full_hub_refuses_the_frame_and_stays_active(void) {
 static void test_local_purge_reconnects_to_the_hub_and_reports_a_loss(void) {
     const iw_can_frame_t frame = {.id = 266, .dlc = 5};
     struct can_frame raw;
-    iw_can_frame_t heard;
+    iw_can_frame_t received;
     TEST_ASSERT_TRUE(iwl_bus_send(&hal.bus, &frame, 1) > 0);
     TEST_ASSERT_EQUAL_INT(IWL_LINK_PURGE_NONE, iwl_hal_link(&hal)->purge);
     TEST_ASSERT_EQUAL_INT(0, iwl_bus_purge(&hal.bus));
@@ -290,7 +290,7 @@ static void test_local_purge_reconnects_to_the_hub_and_reports_a_loss(void) {
     TEST_ASSERT_TRUE(hub >= 0);
     TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, bus());
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, bus());
-    TEST_ASSERT_EQUAL_INT(0, receive(&heard)); // No echo of an earlier frame arrives.
+    TEST_ASSERT_EQUAL_INT(0, receive(&received)); // No echo of an earlier frame arrives.
     TEST_ASSERT_TRUE(iwl_bus_send(&hal.bus, &frame, 1) > 0);
 }
 
@@ -408,9 +408,9 @@ static void test_local_without_an_estop_is_released(void) {
 }
 
 static void lose_hub(void) {
-    iw_can_frame_t heard;
+    iw_can_frame_t received;
     (void)close(hub);
-    TEST_ASSERT_TRUE(receive(&heard) < 0);
+    TEST_ASSERT_TRUE(receive(&received) < 0);
 }
 
 static void assert_waits_longer_and_longer(void) {
@@ -450,9 +450,9 @@ static void test_local_hub_absent_at_start_is_retried_after_20_ms(void) {
 }
 
 static void test_local_bus_off_lasts_until_a_new_hub(void) {
-    iw_can_frame_t heard;
-    tell(CAN_ERR_FLAG | CAN_ERR_BUSOFF, 8, 0, 0);
-    TEST_ASSERT_EQUAL_INT(0, receive(&heard));
+    iw_can_frame_t received;
+    send_frame(CAN_ERR_FLAG | CAN_ERR_BUSOFF, 8, 0, 0);
+    TEST_ASSERT_EQUAL_INT(0, receive(&received));
     for (unsigned ms = 0; ms < 5U; ms++) {
         iwl_bus_poll(&hal.bus, now_us += 1000U);
         TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, bus());

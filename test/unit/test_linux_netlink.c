@@ -324,7 +324,7 @@ static void test_netlink_restart_process_that_was_killed_has_failed(void) {
     }
     TEST_ASSERT_EQUAL_INT(0, waitid(P_PID, (id_t)process, &ended, WEXITED | WNOWAIT));
     TEST_ASSERT_EQUAL_INT(EIO, iwl_netlink_restart_poll(process));
-    TEST_ASSERT_EQUAL_INT_MESSAGE(0, iwl_netlink_restart_poll(process), "somebody else has taken its status");
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, iwl_netlink_restart_poll(process), "another process has read its status");
 }
 
 int main(void) {

@@ -68,7 +68,7 @@ static void live_and_die(long life_ns, unsigned count[IW_SIDES]) {
     (void)close(end[0]);
     TEST_ASSERT_EQUAL_INT(child, waitpid(child, &status, 0));
     TEST_ASSERT_EQUAL_INT(killer, waitpid(killer, NULL, 0));
-    TEST_ASSERT_TRUE_MESSAGE(WIFSIGNALED(status), "it ended by itself");
+    TEST_ASSERT_TRUE_MESSAGE(WIFSIGNALED(status), "it ended on its own");
 }
 
 TEST(test_pair_of_a_killed_process_is_sent_completely_or_not) {

@@ -124,7 +124,7 @@ TEST(test_socketcan_bus_off_is_reported_until_the_carrier_returns) {
     fake_interface_put_error(CAN_ERR_BUSOFF, 0, 0);
     fake_interface.carrier = 0;
     wait_ms(20);
-    TEST_ASSERT_EQUAL_UINT64_MESSAGE(now_us + 200000U, iwl_bus_next_us(&store), "heard");
+    TEST_ASSERT_EQUAL_UINT64_MESSAGE(now_us + 200000U, iwl_bus_next_us(&store), "received");
     wait_ms(200);
     TEST_ASSERT_EQUAL_UINT64_MESSAGE(now_us + 200000U, iwl_bus_next_us(&store), "seen");
     for (unsigned i = 0; i < 100U; i++) {
@@ -141,7 +141,7 @@ TEST(test_socketcan_bus_off_is_reported_until_the_carrier_returns) {
 TEST(test_socketcan_forged_bus_off_is_reported_once_and_checked) {
     fake_interface_put_error(CAN_ERR_BUSOFF, 0, MSG_DONTROUTE);
     wait_ms(1);
-    TEST_ASSERT_EQUAL_UINT(1, fake_interface.looks);
+    TEST_ASSERT_EQUAL_UINT(1, fake_interface.polls);
     TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, state());
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state());
 }

@@ -21,7 +21,7 @@ void tearDown(void) {
     shown = NULL;
 }
 
-static void take(const char *topic, const char *payload) {
+static void receive(const char *topic, const char *payload) {
     fleet_take(&fleet, topic, payload, strlen(payload), 1000000U);
 }
 
@@ -40,9 +40,9 @@ static const char state[] =
     "\"contradicted\"},\"track\":{\"state\":\"confirmed\"}}}";
 
 TEST(test_fleet_machines_are_sorted_and_counted) {
-    take("iwheel/w2/availability", "online");
-    take("iwheel/w10/availability", "offline");
-    take("iwheel/w1/availability", "online");
+    receive("iwheel/w2/availability", "online");
+    receive("iwheel/w10/availability", "offline");
+    receive("iwheel/w1/availability", "online");
     TEST_ASSERT_EQUAL_size_t(3, fleet.count);
     TEST_ASSERT_EQUAL_STRING("w1", fleet.machines[0].id);
     TEST_ASSERT_EQUAL_STRING("w10", fleet.machines[1].id);
@@ -51,8 +51,8 @@ TEST(test_fleet_machines_are_sorted_and_counted) {
 }
 
 TEST(test_fleet_row_has_state_battery_zero_and_unknown_values) {
-    take("iwheel/w1/availability", "online");
-    take("iwheel/w1/state", state);
+    receive("iwheel/w1/availability", "online");
+    receive("iwheel/w1/state", state);
     const char *text = show(fleet_show);
     TEST_ASSERT_NOT_NULL(strstr(text, "online   latched      24.0     -- operator   doubted    0.2.0"));
     TEST_ASSERT_NOT_NULL(strstr(show(fleet_tell), "\"left_battery_dV\":240,\"right_battery_dV\":null,"));
@@ -61,16 +61,17 @@ TEST(test_fleet_row_has_state_battery_zero_and_unknown_values) {
 }
 
 TEST(test_fleet_contradictions_are_counted_across_machines) {
-    take("iwheel/w1/state", state);
-    take("iwheel/w2/state", state);
-    take("iwheel/w3/availability", "online");
+    receive("iwheel/w1/state", state);
+    receive("iwheel/w2/state", state);
+    receive("iwheel/w3/availability", "online");
     TEST_ASSERT_NOT_NULL(strstr(show(fleet_show), "contradicted: radius on 2 of 3\n"));
     TEST_ASSERT_NULL(strstr(shown, "track"));
 }
 
 TEST(test_fleet_stop_has_its_cause_without_control_characters) {
-    take("iwheel/w1/event/stop", "{\"event\":\"stop\",\"cause\":\"wheel_\\u001b[2Jlost\",\"wall_us\":1760000000000000,"
-                                 "\"sentence\":\"left wheel\"}");
+    receive("iwheel/w1/event/stop",
+            "{\"event\":\"stop\",\"cause\":\"wheel_\\u001b[2Jlost\",\"wall_us\":1760000000000000,"
+            "\"sentence\":\"left wheel\"}");
     const char *text = show(fleet_show);
     TEST_ASSERT_NULL(strchr(text, '\033'));
     TEST_ASSERT_NOT_NULL(strstr(text, "wheel_"));
@@ -82,9 +83,10 @@ static const char *row(void) {
 }
 
 TEST(test_fleet_last_stop_is_the_latest_received_one_first) {
-    take("iwheel/w1/info", "{\"last_stop\":null}");
+    receive("iwheel/w1/info", "{\"last_stop\":null}");
     TEST_ASSERT_NOT_NULL(strstr(row(), "\"stop_from\":null"));
-    take("iwheel/w1/info", "{\"last_stop\":{\"number\":1,\"cause\":\"client\",\"wall_us\":2000,\"sentence\":\"s\"}}");
+    receive("iwheel/w1/info",
+            "{\"last_stop\":{\"number\":1,\"cause\":\"client\",\"wall_us\":2000,\"sentence\":\"s\"}}");
     TEST_ASSERT_NOT_NULL(
         strstr(row(), "\"cause\":\"client\",\"stop_wall_us\":2000,\"sentence\":\"s\",\"stop_from\":\"info\""));
     TEST_ASSERT_NOT_NULL(strstr(shown, "\"heard_ms\":null"));
@@ -94,8 +96,8 @@ TEST(test_fleet_last_stop_is_the_latest_received_one_first) {
     stored = "{\"event\":\"stop\",\"cause\":\"wheel_lost\",\"wall_us\":3000}";
     fleet_take_stored(&fleet, "iwheel/w1/event/stop", stored, strlen(stored));
     TEST_ASSERT_NOT_NULL(strstr(row(), "\"stop_wall_us\":3000,\"sentence\":null,\"stop_from\":\"stream\""));
-    take("iwheel/w1/event/stop", "{\"event\":\"stop\",\"cause\":\"estop_line\",\"wall_us\":500}");
-    take("iwheel/w1/info", "{\"last_stop\":{\"number\":1,\"cause\":\"client\",\"wall_us\":9000}}");
+    receive("iwheel/w1/event/stop", "{\"event\":\"stop\",\"cause\":\"estop_line\",\"wall_us\":500}");
+    receive("iwheel/w1/info", "{\"last_stop\":{\"number\":1,\"cause\":\"client\",\"wall_us\":9000}}");
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(row(), "\"stop_wall_us\":500,"), "a clock that was set back makes it no older");
     fleet_take_stored(&fleet, "iwheel/w1/event/stop", "[", 1);
     TEST_ASSERT_EQUAL_UINT64(1, fleet.left_out);
@@ -110,15 +112,15 @@ TEST(test_fleet_table_names_the_source_of_the_last_stops) {
 TEST(test_fleet_garbage_is_ignored_and_counted) {
     static const char *const topics[] = {"iwheel/", "iwheel//state", "iwheel/a b/state", "other/w1/state", "iwheel/w1"};
     for (size_t i = 0; i < sizeof topics / sizeof topics[0]; i++) {
-        take(topics[i], state);
+        receive(topics[i], state);
     }
     TEST_ASSERT_EQUAL_size_t(0, fleet.count);
-    take("iwheel/w1/state", "{\"state\":");
-    take("iwheel/w1/state", "[]");
-    take("iwheel/w1/state", "");
+    receive("iwheel/w1/state", "{\"state\":");
+    receive("iwheel/w1/state", "[]");
+    receive("iwheel/w1/state", "");
     TEST_ASSERT_EQUAL_UINT64(8, fleet.left_out);
     TEST_ASSERT_EQUAL_STRING("", fleet.machines[0].state);
-    take("iwheel/w1/state", "{\"ledger\":7,\"left\":[],\"state\":null}");
+    receive("iwheel/w1/state", "{\"ledger\":7,\"left\":[],\"state\":null}");
     TEST_ASSERT_NOT_NULL(strstr(show(fleet_tell), "\"state\":null"));
 }
 
@@ -126,7 +128,7 @@ TEST(test_fleet_machines_beyond_the_limit_are_counted_only) {
     char topic[64];
     for (unsigned i = 0; i < FLEET_MACHINES + 5U; i++) {
         (void)snprintf(topic, sizeof topic, "iwheel/m%u/availability", i);
-        take(topic, "online");
+        receive(topic, "online");
     }
     TEST_ASSERT_EQUAL_size_t(FLEET_MACHINES, fleet.count);
     TEST_ASSERT_EQUAL_UINT64(5, fleet.left_out);

@@ -14,11 +14,11 @@
 
 static history_t history;
 static FILE *out;
-static char *told;
+static char *printed;
 static size_t told_size;
 
 static void begin(history_config_t config) {
-    out = open_memstream(&told, &told_size);
+    out = open_memstream(&printed, &told_size);
     config.since_us = (config.since_us > 0) ? config.since_us : EVENING_US;
     config.until_us = (config.until_us > 0) ? config.until_us : EVENING_US + 3600 * SECOND_US;
     TEST_ASSERT_TRUE(history_open(&history, &config, out));
@@ -33,12 +33,12 @@ void setUp(void) {
 void tearDown(void) {
     history_close(&history);
     (void)fclose(out);
-    free(told);
+    free(printed);
 }
 
 static const char *text(void) {
     (void)fflush(out);
-    return told;
+    return printed;
 }
 
 /// Adds a stop of w1: boot, number of the event, number of the stop, seconds after EVENING_US of receipt and of
@@ -89,7 +89,7 @@ TEST(test_history_gap_in_numbers_is_printed_before_the_next_event) {
     const char *note = strstr(text(), "-- 3 events before this one are not in the stream");
     TEST_ASSERT_NOT_NULL(note);
     TEST_ASSERT_NOT_NULL(strstr(note, "stop number 2"));
-    TEST_ASSERT_NULL(strstr(told, "stops before"));
+    TEST_ASSERT_NULL(strstr(printed, "stops before"));
     TEST_ASSERT_EQUAL_UINT64(3, history.missing);
 }
 
@@ -152,8 +152,9 @@ TEST(test_history_gap_at_the_end_shows_by_info) {
     TEST_ASSERT_NOT_NULL(strstr(text(),
                                 "-- 3 stops after its last one here are not in the stream; its info names stop 7 "
                                 "of 2026-11-21 22:00:30"));
-    TEST_ASSERT_NOT_NULL(strstr(told, "-- 8 events after its last one here are not in the stream: the broker confirmed "
-                                      "them and did not store them; its spool dropped none"));
+    TEST_ASSERT_NOT_NULL(strstr(printed,
+                                "-- 8 events after its last one here are not in the stream: the broker confirmed "
+                                "them and did not store them; its spool dropped none"));
     TEST_ASSERT_EQUAL_UINT64(3, history.unheard);
 }
 
@@ -205,7 +206,7 @@ TEST(test_history_all_has_other_events_and_bridge_restarts) {
     other("fault",
           "{\"id\":\"b-2\",\"heard_wall_us\":1795298401000000,\"event\":\"fault\",\"cause\":\"bus\",\"present\":true}");
     TEST_ASSERT_NOT_NULL(strstr(text(), "w1           -- its bridge restarted: boot b\n"));
-    TEST_ASSERT_NOT_NULL(strstr(told, "w1           fault  cause bus, present true\n"));
+    TEST_ASSERT_NOT_NULL(strstr(printed, "w1           fault  cause bus, present true\n"));
 }
 
 TEST(test_history_span_accepts_either_clock_of_an_event) {
@@ -217,9 +218,9 @@ TEST(test_history_span_accepts_either_clock_of_an_event) {
     stop("a", 5, 5, 3600, 3601);
     TEST_ASSERT_EQUAL_UINT64(3, history.told);
     TEST_ASSERT_NOT_NULL(strstr(text(), "stop number 2 (stored 2026-11-22 00:30:00)\n"));
-    TEST_ASSERT_NOT_NULL(strstr(told, "stop number 3 (stored 2026-11-21 22:00:10)\n"));
+    TEST_ASSERT_NOT_NULL(strstr(printed, "stop number 3 (stored 2026-11-21 22:00:10)\n"));
     TEST_ASSERT_NOT_NULL(
-        strstr(told, "stop number 4 (THE CLOCK OF THIS MACHINE IS WRONG: stored 2026-11-21 22:00:20)\n"));
+        strstr(printed, "stop number 4 (THE CLOCK OF THIS MACHINE IS WRONG: stored 2026-11-21 22:00:20)\n"));
 }
 
 TEST(test_history_missed_stop_has_its_own_time_and_a_late_mark) {
@@ -239,8 +240,8 @@ TEST(test_history_json_nests_the_message_and_ends_with_the_sum) {
                                 "{\"machine\":\"w1\",\"wall_us\":1795298401000000,\"stored_wall_us\":1795298402000000,"
                                 "\"missing_before\":0,\"stops_missing_before\":0,\"bridge_began_anew\":false,"
                                 "\"message\":{\"id\":\"a-1\""));
-    TEST_ASSERT_NOT_NULL(strstr(told, "\"missing_before\":2,\"stops_missing_before\":2,\"bridge_began_anew\":true"));
-    TEST_ASSERT_NOT_NULL(strstr(told, "{\"events\":2,\"machines\":1,\"doubled\":0,\"garbled\":0,\"missing\":2,"));
+    TEST_ASSERT_NOT_NULL(strstr(printed, "\"missing_before\":2,\"stops_missing_before\":2,\"bridge_began_anew\":true"));
+    TEST_ASSERT_NOT_NULL(strstr(printed, "{\"events\":2,\"machines\":1,\"doubled\":0,\"garbled\":0,\"missing\":2,"));
 }
 
 TEST(test_history_garbage_is_counted_and_prints_no_escape) {
@@ -262,11 +263,11 @@ TEST(test_history_ends_when_its_output_fails) {
     FILE *full = fopen("/dev/full", "w");
     TEST_ASSERT_NOT_NULL(full);
     (void)setvbuf(full, NULL, _IONBF, 0);
-    FILE *kept = history.out;
+    FILE *saved = history.out;
     history.out = full;
     static const char payload[] = "{\"id\":\"a-1\",\"heard_wall_us\":1795298401000000}";
     TEST_ASSERT_FALSE(history_take(&history, "iwheel/w1/event/stop", payload, sizeof payload - 1U, EVENING_US));
-    history.out = kept;
+    history.out = saved;
     (void)fclose(full);
 }
 

@@ -218,7 +218,7 @@ TEST(test_spool_flipped_bit_loses_only_events_from_there_on) {
         for (; mqtt_spool_after(&spool, number, &event); number = event.number) {
             found++;
         }
-        TEST_ASSERT_TRUE_MESSAGE(found < 3U, "what is wrong is not told");
+        TEST_ASSERT_TRUE_MESSAGE(found < 3U, "the fault is not reported");
         expect(1, found);
     }
 }
@@ -284,10 +284,10 @@ TEST(test_spool_disk_full_at_any_byte_loses_nothing) {
     struct rlimit before;
     (void)getrlimit(RLIMIT_FSIZE, &before);
     (void)signal(SIGXFSZ, SIG_IGN);
-    for (rlim_t room = 0; room < 400U; room++) {
+    for (rlim_t limit = 0; limit < 400U; limit++) {
         tearDown();
         setUp();
-        const struct rlimit small = {room, before.rlim_max};
+        const struct rlimit small = {limit, before.rlim_max};
         (void)setrlimit(RLIMIT_FSIZE, &small);
         for (unsigned i = 1; i <= 6; i++) {
             add(i);

@@ -177,11 +177,11 @@ TEST(test_receiver_reports_a_long_line_once_and_recovers) {
 }
 
 TEST(test_receiver_accepts_a_line_of_its_buffer_size_at_most) {
-    char room[26];
+    char receive_buffer[26];
     unsigned verdicts = 0;
-    iwn_receiver_init(&receiver, room, sizeof room, false);
+    iwn_receiver_init(&receiver, receive_buffer, sizeof receive_buffer, false);
     TEST_ASSERT_EQUAL_INT(IWN_LINE_GOOD, put("0 {\"cmd\":\"link\"}*e2d27f9b\n", &verdicts));
-    iwn_receiver_init(&receiver, room, sizeof room - 1U, false);
+    iwn_receiver_init(&receiver, receive_buffer, sizeof receive_buffer - 1U, false);
     TEST_ASSERT_EQUAL_INT(IWN_LINE_TOO_BIG, put("0 {\"cmd\":\"link\"}*e2d27f9b\n", &verdicts));
 }
 
@@ -198,26 +198,27 @@ static const char drive[] = "{\"cmd\":\"drive\",\"left_mm_s\":1,\"right_mm_s\":2
 TEST(test_quote_is_written_before_the_fields_and_removed_again) {
     const iwn_quote_t quote = {.boot = "0123456789abcdef", .seq = 7, .t_us = 1250000};
     char *json = bytes;
-    iwn_quote_t taken;
+    iwn_quote_t accepted;
     size_t length = iwn_quote_write(&quote, drive, sizeof drive - 1U, bytes, sizeof bytes);
     TEST_ASSERT_EQUAL_STRING_LEN("{\"boot\":\"0123456789abcdef\",\"seq\":7,\"t_us\":1250000,\"cmd\":\"drive\",", bytes,
                                  64);
-    TEST_ASSERT_TRUE(iwn_quote_take(&json, &length, &taken));
+    TEST_ASSERT_TRUE(iwn_quote_take(&json, &length, &accepted));
     TEST_ASSERT_EQUAL_UINT(sizeof drive - 1U, length);
     TEST_ASSERT_EQUAL_STRING_LEN(drive, json, length);
-    TEST_ASSERT_EQUAL_STRING(quote.boot, taken.boot);
-    TEST_ASSERT_TRUE(taken.seq == 7U && taken.t_us == 1250000U);
+    TEST_ASSERT_EQUAL_STRING(quote.boot, accepted.boot);
+    TEST_ASSERT_TRUE(accepted.seq == 7U && accepted.t_us == 1250000U);
 }
 
 TEST(test_quote_of_the_largest_numbers_fits_its_size) {
     const iwn_quote_t quote = {.boot = "ffffffffffffffff", .seq = UINT64_MAX, .t_us = UINT64_MAX};
     const size_t needed = sizeof drive - 1U + IWN_QUOTE_SIZE;
     char *json = bytes;
-    iwn_quote_t taken;
+    iwn_quote_t accepted;
     TEST_ASSERT_EQUAL_UINT(0, iwn_quote_write(&quote, drive, sizeof drive - 1U, bytes, needed - 1U));
     size_t length = iwn_quote_write(&quote, drive, sizeof drive - 1U, bytes, needed);
     TEST_ASSERT_TRUE(length > 0U && length < needed);
-    TEST_ASSERT_TRUE(iwn_quote_take(&json, &length, &taken) && taken.seq == UINT64_MAX && taken.t_us == UINT64_MAX);
+    TEST_ASSERT_TRUE(iwn_quote_take(&json, &length, &accepted) && accepted.seq == UINT64_MAX &&
+                     accepted.t_us == UINT64_MAX);
     TEST_ASSERT_EQUAL_STRING_LEN(drive, json, length);
 }
 
@@ -236,9 +237,9 @@ TEST(test_quote_in_another_spelling_is_not_read) {
     for (unsigned i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
         char *json = bytes;
         size_t length = strlen(wrong[i]);
-        iwn_quote_t taken;
+        iwn_quote_t accepted;
         memcpy(bytes, wrong[i], length);
-        TEST_ASSERT_FALSE_MESSAGE(iwn_quote_take(&json, &length, &taken), wrong[i]);
+        TEST_ASSERT_FALSE_MESSAGE(iwn_quote_take(&json, &length, &accepted), wrong[i]);
         TEST_ASSERT_TRUE(json == bytes && length == strlen(wrong[i]));
         TEST_ASSERT_EQUAL_STRING_LEN(wrong[i], bytes, length);
     }

@@ -30,7 +30,7 @@ void tearDown(void) {
     (void)close(peer);
 }
 
-static void say(const char *text) {
+static void send_text(const char *text) {
     TEST_ASSERT_EQUAL_INT((int)strlen(text), (int)send(peer, text, strlen(text), MSG_NOSIGNAL));
     sock_client_read(&client);
 }
@@ -65,26 +65,26 @@ TEST(test_client_bytes_become_a_line_only_at_the_newline) {
     const char *text = "{\"cmd\":\"stop\"}";
     for (const char *c = text; *c != '\0'; c++) {
         const char byte[2] = {*c, '\0'};
-        say(byte);
+        send_text(byte);
         expect_no_line();
     }
-    say("\n");
+    send_text("\n");
     expect_line(text);
     expect_no_line();
 }
 
 TEST(test_client_lines_of_one_read_are_in_order_and_a_part_waits) {
-    say("one\n\ntwo\nhal");
+    send_text("one\n\ntwo\nhal");
     expect_line("one");
     expect_line("");
     expect_line("two");
     expect_no_line();
-    say("f\n");
+    send_text("f\n");
     expect_line("half");
 }
 
 TEST(test_client_part_of_a_line_at_the_end_is_no_line) {
-    say("stop");
+    send_text("stop");
     (void)shutdown(peer, SHUT_WR);
     sock_client_read(&client);
     TEST_ASSERT_EQUAL_INT(SOCK_ENDED, client.phase);
@@ -95,7 +95,7 @@ TEST(test_client_line_of_4096_bytes_fits_and_4097_are_too_long) {
     TEST_ASSERT_EQUAL_INT(IWN_LINE_MAX, (int)send(peer, big, IWN_LINE_MAX, 0));
     sock_client_read(&client);
     TEST_ASSERT_FALSE(sock_client_line_too_long(&client));
-    say("\n");
+    send_text("\n");
     TEST_ASSERT_FALSE(sock_client_line_too_long(&client));
     sock_client_drop_line(&client, IWN_LINE_MAX);
     TEST_ASSERT_EQUAL_UINT(0, client.in_length);
@@ -175,7 +175,7 @@ TEST(test_log_line_has_no_control_characters) {
 }
 
 TEST(test_client_request_within_25_ms_of_caught_up_was_sent_now) {
-    say("{}\n");
+    send_text("{}\n");
     client.caught_up_us = 1000000;
     TEST_ASSERT_EQUAL_UINT64(1025000, sock_client_sent_us(&client, 1025000, 0));
     TEST_ASSERT_EQUAL_UINT64(1000000, sock_client_sent_us(&client, 1025001, 0));
@@ -183,7 +183,7 @@ TEST(test_client_request_within_25_ms_of_caught_up_was_sent_now) {
 }
 
 TEST(test_client_with_an_unread_line_is_not_caught_up) {
-    say("{}\n{}\n");
+    send_text("{}\n{}\n");
     sock_client_note_caught_up(&client, 5);
     expect_line("{}");
     sock_client_note_caught_up(&client, 6);
@@ -219,9 +219,9 @@ TEST(test_client_with_a_full_buffer_is_not_caught_up) {
 }
 
 TEST(test_client_full_or_closing_is_not_read) {
-    const size_t room = sizeof client.in;
-    while (client.in_length < room) {
-        const size_t part = (room - client.in_length < sizeof big) ? room - client.in_length : sizeof big;
+    const size_t capacity = sizeof client.in;
+    while (client.in_length < capacity) {
+        const size_t part = (capacity - client.in_length < sizeof big) ? capacity - client.in_length : sizeof big;
         TEST_ASSERT_EQUAL_INT((int)part, (int)send(peer, big, part, MSG_NOSIGNAL));
         sock_client_read(&client);
     }

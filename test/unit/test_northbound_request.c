@@ -234,9 +234,9 @@ TEST(test_request_missing_field_is_named) {
 }
 
 /// The refusal of the line has this error and this text.
-static void refused_with(iwn_error_t error, const char *says, const char *line) {
+static void refused_with(iwn_error_t error, const char *words, const char *line) {
     refused(error, line);
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(refusal.message, says), refusal.message);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(refusal.message, words), refusal.message);
 }
 
 TEST(test_request_first_fault_in_the_line_is_named) {

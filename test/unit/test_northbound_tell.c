@@ -26,7 +26,7 @@ void tearDown(void) {
     TEST_ASSERT_NULL_MESSAGE(rig.judge.violation, rig.judge.violation);
 }
 
-static iw_snapshot_t look(void) {
+static iw_snapshot_t snapshot(void) {
     iw_snapshot_t seen;
     iw_gateway_snapshot(&rig.gateway, rig.now_us, &seen);
     return seen;
@@ -43,7 +43,7 @@ static void finish(void) {
 }
 
 static void status(void) {
-    const iw_snapshot_t seen = look();
+    const iw_snapshot_t seen = snapshot();
     iwn_tell_machine(&seen, &around, &json);
     iwn_tell_rest(&seen, &around, &json);
     finish();
@@ -100,7 +100,7 @@ TEST(test_stop_without_a_time_of_day_has_its_age) {
     (void)gateway_rig_cruise(&rig, 300, 300, 200000U);
     gateway_rig_press(&rig, true);
     gateway_rig_run(&rig, 500000U);
-    const iw_snapshot_t seen = look();
+    const iw_snapshot_t seen = snapshot();
     iwn_stop_note_t note = {.stop = *seen.stop, .wall_us = IWN_WALL_UNKNOWN, .sentence = "pressed"};
     iwn_tell_stop(&note, rig.now_us, &json);
     finish();

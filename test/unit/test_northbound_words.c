@@ -177,10 +177,9 @@ TEST(test_text_of_any_code_point_is_read_back_unchanged) {
     }
 }
 
-// ---- refusals
-// ---------------------------------------------------------------------------------------------------------
+// ---- refusals -------------------------------------------------------------------------------------------------------
 
-static iw_codec_wheel_t told[IW_SIDES];
+static iw_codec_wheel_t telemetry[IW_SIDES];
 static iw_config_t config = {.rest_rpm = 2, .rest_ms = 200};
 static iw_snapshot_t seen;
 static iwn_refusal_t refusal;
@@ -190,7 +189,7 @@ static const char *not_at_rest(void) {
     const iwn_request_t request = {.cmd = IWN_CMD_ARM};
     seen.config = &config;
     for (unsigned side = 0; side < IW_SIDES; side++) {
-        seen.wheel[side].told = &told[side];
+        seen.wheel[side].told = &telemetry[side];
         seen.wheel[side].heard = true;
     }
     iwn_refuse_describe(&moment, &request, IW_REFUSE_NOT_AT_REST, &refusal);
@@ -204,12 +203,12 @@ TEST(test_refusal_at_standstill_names_the_time_and_no_speeds) {
         static const int16_t still[] = {-2, 2};
         static const int16_t moving[] = {-3, 3};
         for (size_t i = 0; i < 2U; i++) {
-            told[side].speed.speed_rpm = still[i];
+            telemetry[side].speed.speed_rpm = still[i];
             TEST_ASSERT_NULL(strstr(not_at_rest(), turning));
-            told[side].speed.speed_rpm = moving[i];
+            telemetry[side].speed.speed_rpm = moving[i];
             TEST_ASSERT_NOT_NULL(strstr(not_at_rest(), turning));
         }
-        told[side].speed.speed_rpm = 0;
+        telemetry[side].speed.speed_rpm = 0;
         seen.applied.wheel[side].speed_mm_s = 1;
         TEST_ASSERT_NOT_NULL(strstr(not_at_rest(), turning));
         seen.applied.wheel[side].speed_mm_s = 0;

@@ -19,7 +19,7 @@
 
 static iw_config_t config;
 static iw_gateway_t gateway;
-static iw_codec_wheel_t told[IW_SIDES];
+static iw_codec_wheel_t telemetry[IW_SIDES];
 static iw_observation_t observation;
 static iw_snapshot_t seen;
 
@@ -27,11 +27,11 @@ static void begin_at(iw_time_us_t now_us) {
     const iw_hal_t hal = {0};
     memset(&gateway, FIXTURE_POISON, sizeof gateway);
     memset(&observation, FIXTURE_POISON, sizeof observation);
-    memset(told, 0, sizeof told);
+    memset(telemetry, 0, sizeof telemetry);
     TEST_ASSERT_EQUAL_INT(IW_CONFIG_OK, iw_gateway_init(&gateway, &config, &hal, now_us, false));
     iw_gateway_snapshot(&gateway, now_us, &seen);
-    seen.wheel[IW_LEFT].told = &told[IW_LEFT];
-    seen.wheel[IW_RIGHT].told = &told[IW_RIGHT];
+    seen.wheel[IW_LEFT].told = &telemetry[IW_LEFT];
+    seen.wheel[IW_RIGHT].told = &telemetry[IW_RIGHT];
     iw_observation_init(&observation);
 }
 
@@ -40,7 +40,7 @@ void setUp(void) {
     begin_at(FIXTURE_START_US);
 }
 
-static void look(void) {
+static void observe(void) {
     iw_observation_step(&observation, &gateway, &seen);
 }
 
@@ -59,8 +59,8 @@ static void assert_ratio(iw_assumption_state_t state, int32_t figure) {
 static void speed_of(iw_side_t side, int16_t rpm, iw_time_us_t after_us) {
     seen.at_us += after_us;
     seen.wheel[side].speed_us = seen.at_us;
-    told[side].speed.speed_rpm = rpm;
-    look();
+    telemetry[side].speed.speed_rpm = rpm;
+    observe();
 }
 
 static void speeds(int16_t rpm, unsigned frames) {
@@ -72,7 +72,7 @@ static void speeds(int16_t rpm, unsigned frames) {
 static void status_of(iw_side_t side, int64_t moved) {
     seen.wheel[side].status_us = seen.at_us;
     seen.wheel[side].ticks += moved;
-    look();
+    observe();
 }
 
 static void begin_stretch(int16_t rpm) {
@@ -280,7 +280,7 @@ TEST(test_observation_same_snapshot_again_adds_nothing) {
     begin_stretch(12);
     for (unsigned i = 0; i < FRAMES; i++) {
         speed_of(IW_LEFT, (i % 2U == 0U) ? 9 : 12, FRAME_US);
-        look();
+        observe();
     }
     assert_ratio(IW_ASSUMED, 0);
     status_of(IW_LEFT, 105);
@@ -311,9 +311,9 @@ static void drive_side(iw_side_t side, int16_t applied_mm_s, int32_t measured_mm
     seen.wheel[side].um_s_per_rpm = 20999;
     seen.wheel[side].speed_mm_s = measured_mm_s;
     seen.applied.wheel[side].speed_mm_s = applied_mm_s;
-    look();
+    observe();
     seen.at_us += for_us;
-    look();
+    observe();
 }
 
 static void assert_type(iw_assumption_state_t state, int32_t figure) {
@@ -344,9 +344,9 @@ TEST(test_observation_speed_within_15_percent_and_1_rpm_matches) {
 TEST(test_observation_one_rpm_depends_on_the_wheel_radius) {
     assert_drive(1000, 1172, false);
     seen.wheel[IW_LEFT].um_s_per_rpm = 21000;
-    look();
+    observe();
     seen.at_us += IW_OBSERVATION_TYPE_US;
-    look();
+    observe();
     assert_type(IW_CONFIRMED, 1172);
 }
 
@@ -363,7 +363,7 @@ static void assert_not_before_a_second(iw_side_t side) {
     drive_side(side, 200, 210, IW_OBSERVATION_TYPE_US - 1U);
     assert_type(IW_ASSUMED, 0);
     seen.at_us += 1U;
-    look();
+    observe();
     assert_type(IW_CONFIRMED, 1050);
 }
 
@@ -376,15 +376,15 @@ TEST(test_observation_type_needs_armed_state_and_telemetry) {
     assert_drive(200, 300, false);
     seen.wheel[IW_LEFT].speed_mm_s = 200;
     seen.state = IW_STATE_STOPPING;
-    look();
+    observe();
     seen.at_us += IW_OBSERVATION_TYPE_US;
-    look();
+    observe();
     assert_type(IW_ASSUMED, 0);
     seen.state = IW_STATE_ARMED;
     seen.wheel[IW_LEFT].heard = false;
-    look();
+    observe();
     seen.at_us += IW_OBSERVATION_TYPE_US;
-    look();
+    observe();
     assert_type(IW_ASSUMED, 0);
 }
 
@@ -402,8 +402,8 @@ TEST(test_observation_new_command_restarts_the_second) {
 static void pose(int x_mm, int y_mm, int psi_mrad, iw_time_us_t after_us) {
     seen.at_us += after_us;
     seen.pose_us = seen.at_us;
-    told[IW_RIGHT].pose = (iw_codec_pose_t){(int16_t)x_mm, (int16_t)y_mm, 0, (int16_t)psi_mrad};
-    look();
+    telemetry[IW_RIGHT].pose = (iw_codec_pose_t){(int16_t)x_mm, (int16_t)y_mm, 0, (int16_t)psi_mrad};
+    observe();
 }
 
 /// Poses from the origin in steps of `step`, 2 * `step` and 3 * `step`.
@@ -475,7 +475,7 @@ TEST(test_observation_pose_wraps_in_the_shorter_direction) {
 TEST(test_observation_unchanged_pose_is_no_step) {
     walk(1, 0, 24);
     pose(24, 48, 72, POSE_US);
-    look();
+    observe();
     assert_pose(IW_ASSUMED, 0);
     walk(1, 25, 25);
     assert_pose(IW_CONFIRMED, 256000);

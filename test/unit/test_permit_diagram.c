@@ -58,7 +58,7 @@ static const struct {
     {IW_PHASE_ARMING, STRANGER, IW_PHASE_LISTENING},
     {IW_PHASE_ARMING, STRANGERS, IW_PHASE_LISTENING},
     {IW_PHASE_ARMING, CAUSE_ALWAYS, IW_PHASE_CUT},
-    {IW_PHASE_ARMING, HELD, IW_PHASE_LISTENING}, // A hold takes longer than the limit of the confirmation.
+    {IW_PHASE_ARMING, HELD, IW_PHASE_LISTENING}, // A hold lasts longer than the limit of the confirmation.
 
     {IW_PHASE_ARMED, LEASE_LOST, IW_PHASE_BRAKING},
     {IW_PHASE_ARMED, STOP, IW_PHASE_BRAKING},
@@ -185,7 +185,7 @@ static void pass(uint32_t for_ms) {
     }
 }
 
-static void look(bool proven, bool output_zero) {
+static void set_view(bool proven, bool output_zero) {
     rig.view.proven = proven;
     rig.view.output_zero = output_zero;
     permit_rig_step(&rig);
@@ -234,7 +234,7 @@ static void happen(event_t event) {
     switch (event) {
     case CONFIRMED:
     case OUTPUT_ZERO:
-        look(event == CONFIRMED, event == OUTPUT_ZERO);
+        set_view(event == CONFIRMED, event == OUTPUT_ZERO);
         break;
     case NOT_IN_TIME:
     case LEASE_LOST:
@@ -292,7 +292,7 @@ TEST(test_permit_each_phase_has_its_state_and_its_demand) {
         iw_state_t state;
         iw_demand_t demand;
         bool arming;
-    } told[IW_PHASES] = {
+    } public_state[IW_PHASES] = {
         [IW_PHASE_LISTENING] = {IW_STATE_LISTENING, IW_DEMAND_SILENCE, false},
         [IW_PHASE_ARMING] = {IW_STATE_LISTENING, IW_DEMAND_ZERO, true},
         [IW_PHASE_ARMED] = {IW_STATE_ARMED, IW_DEMAND_FOLLOW, false},
@@ -305,9 +305,9 @@ TEST(test_permit_each_phase_has_its_state_and_its_demand) {
     };
     for (unsigned phase = 0; phase < IW_PHASES; phase++) {
         begin(phase);
-        TEST_ASSERT_EQUAL_INT_MESSAGE(told[phase].state, iw_permit_state(&rig.permit), beginnings[phase]);
-        TEST_ASSERT_EQUAL_INT_MESSAGE(told[phase].demand, iw_permit_demand(&rig.permit), beginnings[phase]);
-        TEST_ASSERT_EQUAL_INT_MESSAGE(told[phase].arming, iw_permit_arming(&rig.permit), beginnings[phase]);
+        TEST_ASSERT_EQUAL_INT_MESSAGE(public_state[phase].state, iw_permit_state(&rig.permit), beginnings[phase]);
+        TEST_ASSERT_EQUAL_INT_MESSAGE(public_state[phase].demand, iw_permit_demand(&rig.permit), beginnings[phase]);
+        TEST_ASSERT_EQUAL_INT_MESSAGE(public_state[phase].arming, iw_permit_arming(&rig.permit), beginnings[phase]);
     }
 }
 

@@ -408,7 +408,7 @@ static void assert_next_is_right(void) {
         rig.permit = now;
     }
     if (next_us != IW_NEVER) {
-        TEST_ASSERT_TRUE_MESSAGE(next_us > rig.now_us, "asks to be called again at once");
+        TEST_ASSERT_TRUE_MESSAGE(next_us > rig.now_us, "asks to be called again immediately");
         iw_permit_step(&rig.permit, next_us);
         TEST_ASSERT_TRUE_MESSAGE(outside(&now) != outside(&rig.permit), "nothing changed at next_us");
         rig.permit = now;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The lease: which requests extend it, when it ends, and which client can take it over.
+// The lease: which requests extend it, when it ends, and which client can acquire it by takeover.
 #include "permit_rig.h"
 #include "unit.h"
 

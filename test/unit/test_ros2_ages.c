@@ -56,8 +56,7 @@ static ros_age_t other_sends(int64_t for_us) {
     return age;
 }
 
-// ---- this machine
-// -----------------------------------------------------------------------------------------------------
+// ---- this machine ---------------------------------------------------------------------------------------------------
 
 TEST(test_ages_first_sample_of_a_minute_ago_is_late) {
     TEST_ASSERT_EQUAL_INT(ROS_AGE_LATE, command_of(7, 60 * SECOND));
@@ -144,8 +143,7 @@ TEST(test_ages_clock_that_is_slewed_is_not_doubted) {
     }
 }
 
-// ---- other machines
-// ---------------------------------------------------------------------------------------------------
+// ---- other machines -------------------------------------------------------------------------------------------------
 
 TEST(test_ages_other_writer_is_known_after_a_second) {
     begin(false, false);

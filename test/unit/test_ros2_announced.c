@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Announcements of a domain, before CycloneDDS reads them: large free data becomes padding, everything else stays byte for byte.
+// Announcements of a domain, before CycloneDDS reads them: large free data becomes padding, all other bytes stay.
 #include "announced.h"
 #include "log_limit.h"
 
@@ -35,7 +35,7 @@ static size_t parameter(unsigned id, size_t size, bool little) {
     return at;
 }
 
-/// A message with one DATA of this writer; where its list of parameters begins to be filled. `finish` ends it.
+/// Begins a message with one DATA of this writer. Returns the offset of its list of parameters. `finish` ends the message.
 static size_t begin(uint8_t kind, uint8_t second, bool little, bool has_qos) {
     static const uint8_t head[] = {'R', 'T', 'P', 'S', 2, 1, 1, 16, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1};
     memset(message, 0, sizeof message);
@@ -51,7 +51,7 @@ static size_t begin(uint8_t kind, uint8_t second, bool little, bool has_qos) {
     memcpy(message + length, writer, 4);
     length += 12U;
     if (has_qos) {
-        (void)parameter(USER, 600, little); // Not in the list that is meant.
+        (void)parameter(USER, 600, little); // This list is the inline QoS, not the announcement.
         put(1, little);
         put(0, little);
     }
@@ -99,11 +99,11 @@ static void test_announced_large_data_becomes_padding_and_the_rest_stays(void) {
     }
 }
 
-/// CycloneDDS sends what is longer than 1344 bytes in fragments: the free data begins in the first one and ends in another.
-static void test_announced_data_that_begins_in_the_first_fragment_becomes_padding(void) {
+/// CycloneDDS sends messages of more than 1344 bytes in fragments: the free data begins in the first one and ends in another.
+static void test_announced_data_begun_in_first_fragment_becomes_padding(void) {
     for (unsigned first = 1; first <= 2U; first++) {
         (void)begin(3, 0, true, false);
-        memmove(message + 56, message + 44, 4); // The encapsulation, behind the longer head.
+        memmove(message + 56, message + 44, 4); // Moves the encapsulation behind the longer head.
         memset(message + 44, 0, 12);
         message[20] = 0x16;
         rtps_write(28, 2, true, message + 26);
@@ -127,13 +127,14 @@ static void test_announced_data_of_a_user_is_untouched(void) {
     finish(true);
     TEST_ASSERT_EQUAL_MEMORY(before, message, sizeof before);
     (void)begin(3, 0, true, false);
-    message[length - 3U] = 1; // CDR, no list.
+    message[length - 3U] = 1; // CDR instead of a list of parameters.
     (void)parameter(USER, 4000, true);
     finish(true);
     TEST_ASSERT_EQUAL_MEMORY(before, message, sizeof before);
 }
 
-/// Every length of a message, and every byte of its heads damaged: no access beyond it (with the sanitizer), no change beyond it.
+/// Cuts the message at every length and damages every byte of its heads: the function reads nothing beyond the message (a sanitizer
+/// would report it) and changes nothing beyond it.
 static void test_announced_message_that_is_cut_or_damaged_is_survived(void) {
     (void)begin(3, 0, true, true);
     (void)parameter(NAME, 40, true);
@@ -175,7 +176,7 @@ static void test_log_of_others_is_bounded_and_counts_what_it_leaves_out(void) {
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_announced_large_data_becomes_padding_and_the_rest_stays);
-    RUN_TEST(test_announced_data_that_begins_in_the_first_fragment_becomes_padding);
+    RUN_TEST(test_announced_data_begun_in_first_fragment_becomes_padding);
     RUN_TEST(test_announced_data_of_a_user_is_untouched);
     RUN_TEST(test_announced_message_that_is_cut_or_damaged_is_survived);
     RUN_TEST(test_log_of_others_is_bounded_and_counts_what_it_leaves_out);

@@ -6,13 +6,13 @@
 
 #include <string.h>
 
-#define ROOM 512U
+#define SIZE 512U
 #define HEAD ((size_t)20)
 #define BEAT ((size_t)32)
 
 static rtps_firsts_t firsts;
-static uint8_t message[ROOM];
-static uint8_t out[ROOM];
+static uint8_t message[SIZE];
+static uint8_t out[SIZE];
 static size_t length;
 
 void setUp(void) {
@@ -63,10 +63,10 @@ static void put_heartbeat(bool little, uint8_t writer_kind, int64_t first, int64
 }
 
 /// Does not change the message. Returns 0 if there is nothing to add.
-static size_t await_in(int64_t now_us, size_t count, size_t room) {
+static size_t await_in(int64_t now_us, size_t count, size_t capacity) {
     memset(out, 0xA5, sizeof out);
     memcpy(out, message, count);
-    const size_t used = rtps_await_firsts(&firsts, now_us, out, count, room);
+    const size_t used = rtps_await_firsts(&firsts, now_us, out, count, capacity);
     TEST_ASSERT_EACH_EQUAL_HEX8(0xA5, out + used, sizeof out - used);
     if (used == count) {
         TEST_ASSERT_EQUAL_MEMORY(message, out, count);
@@ -154,7 +154,7 @@ TEST(test_firsts_other_messages_are_unchanged) {
         put_heartbeat(true, others[i].kind, others[i].first, others[i].last);
         TEST_ASSERT_EQUAL_size_t_MESSAGE(0, await_at(0), others[i].what);
     }
-    TEST_ASSERT_EQUAL_size_t_MESSAGE(0, firsts.count, "nobody was remembered");
+    TEST_ASSERT_EQUAL_size_t_MESSAGE(0, firsts.count, "no writer was stored");
     begin_message(1);
     put_heartbeat(true, 3, 1, 1);
     message[HEAD] = 8;
@@ -178,8 +178,8 @@ TEST(test_firsts_damaged_message_or_small_buffer_is_unchanged) {
     for (size_t size = 1; size < whole; size++) {
         TEST_ASSERT_EQUAL_size_t((size == HEAD + BEAT) ? size + BEAT : 0U, await_in(0, size, sizeof out));
     }
-    for (size_t room = whole; room < whole + BEAT; room++) {
-        TEST_ASSERT_EQUAL_size_t(0, await_in(0, whole, room));
+    for (size_t capacity = whole; capacity < whole + BEAT; capacity++) {
+        TEST_ASSERT_EQUAL_size_t(0, await_in(0, whole, capacity));
     }
     TEST_ASSERT_EQUAL_size_t(whole + BEAT, await_in(0, whole, whole + BEAT));
     message[HEAD + 2U] = 27; // Too short for a heartbeat.
@@ -198,7 +198,7 @@ TEST(test_firsts_each_heartbeat_of_a_message_gets_its_own) {
     TEST_ASSERT_EQUAL_MEMORY(message + HEAD, out + HEAD + BEAT, 2 * BEAT);
     TEST_ASSERT_EQUAL_INT64(4, rtps_read_sequence(out + HEAD + 3 * BEAT + 20U, false));
     TEST_ASSERT_EQUAL_MEMORY(message + HEAD + 2 * BEAT, out + HEAD + 4 * BEAT, BEAT);
-    TEST_ASSERT_EQUAL_size_t_MESSAGE(length + BEAT, await_in(0, length, length + BEAT), "there is room for one");
+    TEST_ASSERT_EQUAL_size_t_MESSAGE(length + BEAT, await_in(0, length, length + BEAT), "there is space for one");
 }
 
 // ---- ACKNACKs -------------------------------------------------------------------------------------------------------

@@ -6,11 +6,11 @@
 
 #include <string.h>
 
-#define ROOM 256U
+#define SIZE 256U
 
 static ros_caller_t caller;
-static uint8_t message[ROOM];
-static uint8_t out[ROOM];
+static uint8_t message[SIZE];
+static uint8_t out[SIZE];
 static size_t length;
 static ros_marks_t marks;
 
@@ -150,8 +150,7 @@ TEST(test_service_identity_of_a_damaged_message_is_none) {
     TEST_ASSERT_FALSE(ros_service_identify(message, length, 20, &caller));
 }
 
-// ---- replies
-// ----------------------------------------------------------------------------------------------------------
+// ---- replies --------------------------------------------------------------------------------------------------------
 
 TEST(test_service_reply_of_fast_dds_is_flag_and_text) {
     const uint8_t wanted[] = {0, 1, 0, 0, 1, 0, 0, 0, 3, 0, 0, 0, 'o', 'k', 0};
@@ -175,15 +174,14 @@ TEST(test_service_reply_that_does_not_fit_is_cut) {
     for (size_t size = 40; size < 100U; size++) {
         memset(out, 0xA5, sizeof out);
         const size_t used = ros_service_write(
-            &caller, true, "a text that is longer than what there is room for in it, by far", out, size);
+            &caller, true, "a text that is much longer than the space for it in the message", out, size);
         TEST_ASSERT_LESS_OR_EQUAL_size_t(size, used);
         TEST_ASSERT_EQUAL_HEX8(0, out[used - 1U]);
         TEST_ASSERT_EQUAL_HEX8(0xA5, out[size]);
     }
 }
 
-// ---- additions
-// --------------------------------------------------------------------------------------------------------
+// ---- additions ------------------------------------------------------------------------------------------------------
 
 static void note(ros_form_t form, uint8_t last) {
     ros_caller_t of = {.form = form, .number = 0x100000002LL};
@@ -269,9 +267,9 @@ TEST(test_service_mark_is_stored_for_the_newest_callers_only) {
         length = 0;
         begin_message();
         put_data(true, i, NULL, 0);
-        const bool kept = i > 2U && i <= ROS_MARKS + 2U;
-        TEST_ASSERT_EQUAL_size_t(kept ? length + ROS_MARK_SIZE : 0U, mark());
-        if (kept) {
+        const bool stored = i > 2U && i <= ROS_MARKS + 2U;
+        TEST_ASSERT_EQUAL_size_t(stored ? length + ROS_MARK_SIZE : 0U, mark());
+        if (stored) {
             TEST_ASSERT_TRUE(ros_service_identify(out, sizeof out, 20, &caller));
             TEST_ASSERT_EACH_EQUAL_HEX8(i, caller.guid, ROS_GUID_SIZE);
         }
@@ -287,8 +285,8 @@ TEST(test_service_mark_of_a_damaged_message_is_none) {
     for (length = 0; length < whole; length++) {
         TEST_ASSERT_EQUAL_size_t(0, mark());
     }
-    for (size_t room = 0; room < whole + ROS_MARK_SIZE; room++) {
-        TEST_ASSERT_EQUAL_size_t(0, ros_service_mark(&marks, message, whole, out, room));
+    for (size_t capacity = 0; capacity < whole + ROS_MARK_SIZE; capacity++) {
+        TEST_ASSERT_EQUAL_size_t(0, ros_service_mark(&marks, message, whole, out, capacity));
     }
     TEST_ASSERT_EQUAL_size_t(whole + ROS_MARK_SIZE,
                              ros_service_mark(&marks, message, whole, out, whole + ROS_MARK_SIZE));

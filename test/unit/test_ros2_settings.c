@@ -8,7 +8,7 @@
 #include <string.h>
 
 static ros_settings_t settings;
-static char *told;
+static char *messages;
 static size_t told_size;
 
 void setUp(void) {
@@ -16,12 +16,12 @@ void setUp(void) {
 }
 
 void tearDown(void) {
-    free(told);
-    told = NULL;
+    free(messages);
+    messages = NULL;
 }
 
 static int read_text(const char *text) {
-    settings_report_t report = {.name = "f", .err = open_memstream(&told, &told_size)};
+    settings_report_t report = {.name = "f", .err = open_memstream(&messages, &told_size)};
     const int result = settings_parse(&ros_settings_form, &report, text, strlen(text), &settings);
     (void)fclose(report.err);
     return result;
@@ -70,8 +70,8 @@ TEST(test_settings_each_error_names_line_and_fix) {
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         setUp();
         TEST_ASSERT_EQUAL_INT(SETTINGS_ERROR, read_text(cases[i].text));
-        if (strncmp(told, "f:2: ", 5) != 0 || strstr(told, cases[i].words) == NULL) {
-            TEST_FAIL_MESSAGE(told);
+        if (strncmp(messages, "f:2: ", 5) != 0 || strstr(messages, cases[i].words) == NULL) {
+            TEST_FAIL_MESSAGE(messages);
         }
         tearDown();
     }

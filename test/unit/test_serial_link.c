@@ -28,17 +28,17 @@ static serial_news_t hear_raw(const char *bytes, uint64_t now_us) {
     return news;
 }
 
-static serial_news_t hear(uint8_t channel, uint64_t t_us, const char *json, uint64_t now_us) {
-    const iwn_line_t said = {.channel = channel, .stamped = true, .t_us = t_us, .json = json, .length = strlen(json)};
+static serial_news_t receive(uint8_t channel, uint64_t t_us, const char *json, uint64_t now_us) {
+    const iwn_line_t sent = {.channel = channel, .stamped = true, .t_us = t_us, .json = json, .length = strlen(json)};
     char bytes[512];
-    bytes[iwn_line_write(&said, bytes, sizeof bytes - 1U)] = '\0';
+    bytes[iwn_line_write(&sent, bytes, sizeof bytes - 1U)] = '\0';
     return hear_raw(bytes, now_us);
 }
 
 static serial_news_t hear_link(const char *boot, uint64_t t_us, uint64_t now_us) {
     char json[128];
     (void)snprintf(json, sizeof json, "{\"event\":\"link\",\"boot\":\"%s\",\"version\":\"1\"}", boot);
-    return hear(0, t_us, json, now_us);
+    return receive(0, t_us, json, now_us);
 }
 
 static uint64_t stamp_at(uint64_t then_us) {
@@ -47,11 +47,11 @@ static uint64_t stamp_at(uint64_t then_us) {
 }
 
 TEST(test_link_is_up_from_its_event_on) {
-    TEST_ASSERT_EQUAL_INT(SERIAL_NEWS_NONE, hear(1, 1, "{\"ok\":true}", 10));
+    TEST_ASSERT_EQUAL_INT(SERIAL_NEWS_NONE, receive(1, 1, "{\"ok\":true}", 10));
     TEST_ASSERT_EQUAL_INT(SERIAL_NEWS_LINKED, hear_link(BOOT, 5, 20));
     TEST_ASSERT_EQUAL_STRING(BOOT, state.boot);
     TEST_ASSERT_EQUAL_INT(SERIAL_NEWS_NONE, hear_link(BOOT, 6, 30));
-    TEST_ASSERT_EQUAL_INT(SERIAL_NEWS_LINE, hear(1, 7, "{\"ok\":true}", 40));
+    TEST_ASSERT_EQUAL_INT(SERIAL_NEWS_LINE, receive(1, 7, "{\"ok\":true}", 40));
     TEST_ASSERT_EQUAL_UINT(1, line.channel);
 }
 
@@ -65,7 +65,7 @@ TEST(test_link_another_boot_is_a_new_link) {
 
 TEST(test_link_stamp_that_decreases_is_a_restart) {
     (void)hear_link(BOOT, 5000000, 10);
-    TEST_ASSERT_EQUAL_INT(SERIAL_NEWS_LOST, hear(2, 4000, "{\"event\":\"state\"}", 20));
+    TEST_ASSERT_EQUAL_INT(SERIAL_NEWS_LOST, receive(2, 4000, "{\"event\":\"state\"}", 20));
     TEST_ASSERT_EQUAL(SERIAL_SILENT, state.state);
     TEST_ASSERT_EQUAL_UINT64(UINT64_MAX, stamp_at(30));
     TEST_ASSERT_EQUAL_INT(SERIAL_NEWS_LINKED, hear_link(OTHER, 5000, 30));
@@ -74,7 +74,7 @@ TEST(test_link_stamp_that_decreases_is_a_restart) {
 TEST(test_link_stamp_is_the_newest_received_by_that_time) {
     (void)hear_link(BOOT, 100, 1000);
     for (unsigned i = 1; i <= 100U; i++) {
-        (void)hear(1, 100U + i * 20000U, "{}", 1000U + i * 20000U);
+        (void)receive(1, 100U + i * 20000U, "{}", 1000U + i * 20000U);
     }
     TEST_ASSERT_EQUAL_UINT64(100U + 100U * 20000U, stamp_at(1000U + 100U * 20000U));
     TEST_ASSERT_EQUAL_UINT64(100U + 99U * 20000U, stamp_at(999U + 100U * 20000U));
@@ -85,7 +85,7 @@ TEST(test_link_stamp_is_the_newest_received_by_that_time) {
 TEST(test_link_stamps_at_short_intervals_cover_the_same_time) {
     (void)hear_link(BOOT, 100, 1000);
     for (unsigned i = 1; i <= 1000U; i++) {
-        (void)hear(1, 100U + i * 200U, "{}", 1000U + i * 200U);
+        (void)receive(1, 100U + i * 200U, "{}", 1000U + i * 200U);
     }
     TEST_ASSERT_EQUAL_UINT64(100U + 1000U * 200U, stamp_at(1000U + 1000U * 200U));
     const uint64_t then_us = 1000U + 400U * 200U;
@@ -103,11 +103,11 @@ TEST(test_link_goes_offline_once) {
 TEST(test_link_bad_lines_are_counted_and_change_nothing) {
     (void)hear_link(BOOT, 5, 1000);
     TEST_ASSERT_EQUAL_INT(SERIAL_NEWS_NONE, hear_raw("1 6 {\"ok\":true}*00000000\n", 2000));
-    TEST_ASSERT_EQUAL_INT(SERIAL_NEWS_NONE, hear(1, 7, "{\"ok\":tru}", 2000));
-    TEST_ASSERT_EQUAL_INT(SERIAL_NEWS_NONE, hear(0, 8, "{\"event\":\"link\",\"boot\":\"short\"}", 2000));
+    TEST_ASSERT_EQUAL_INT(SERIAL_NEWS_NONE, receive(1, 7, "{\"ok\":tru}", 2000));
+    TEST_ASSERT_EQUAL_INT(SERIAL_NEWS_NONE, receive(0, 8, "{\"event\":\"link\",\"boot\":\"short\"}", 2000));
     TEST_ASSERT_EQUAL_UINT64(2, state.refused);
     TEST_ASSERT_EQUAL_STRING(BOOT, state.boot);
-    (void)hear(0, 9, "{\"event\":\"line_error\",\"reason\":\"crc\",\"count\":3}", 2000);
+    (void)receive(0, 9, "{\"event\":\"line_error\",\"reason\":\"crc\",\"count\":3}", 2000);
     TEST_ASSERT_EQUAL_UINT64(3, state.complaints);
 }
 

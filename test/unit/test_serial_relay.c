@@ -118,14 +118,14 @@ void sock_wakeup_close(sock_wakeup_t *self) {
     (void)close(self->fd);
 }
 
-int sock_wakeup_wait(const sock_wakeup_t *self, struct epoll_event *events, int room, iw_time_us_t read_us,
+int sock_wakeup_wait(const sock_wakeup_t *self, struct epoll_event *events, int max, iw_time_us_t read_us,
                      iw_time_us_t until_us) {
     (void)read_us;
     (void)until_us;
     now_us += STEP_MS * 1000U;
     const bool ends = script();
     step++;
-    int count = epoll_wait(self->fd, events, room - 2, 0);
+    int count = epoll_wait(self->fd, events, max - 2, 0);
     if (to_relay_length > 0U) {
         events[count++] = (struct epoll_event){.events = EPOLLIN, .data = {.u64 = SOCK_TAG_BUS}};
     }
@@ -415,7 +415,7 @@ static bool board_comes(void) {
 }
 
 static void test_relay_log_without_a_reader_does_not_end_the_relay(void) {
-    const int kept = dup(STDERR_FILENO);
+    const int saved = dup(STDERR_FILENO);
     int ends[2];
     TEST_ASSERT_EQUAL_INT(0, pipe(ends));
     (void)close(ends[0]);
@@ -423,8 +423,8 @@ static void test_relay_log_without_a_reader_does_not_end_the_relay(void) {
     (void)signal(SIGPIPE, SIG_DFL);
     script = board_comes;
     const int code = relay_run(&relay, &settings);
-    (void)dup2(kept, STDERR_FILENO);
-    (void)close(kept);
+    (void)dup2(saved, STDERR_FILENO);
+    (void)close(saved);
     (void)close(ends[1]);
     TEST_ASSERT_EQUAL_INT(0, code);
 }
@@ -498,13 +498,13 @@ static char complaints[4096]; // Captured log.
 static void run_logged(bool (*play)(void)) {
     char path[64];
     (void)snprintf(path, sizeof path, "%s/log", folder);
-    const int kept = dup(STDERR_FILENO);
+    const int saved = dup(STDERR_FILENO);
     const int file = open(path, O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
     (void)dup2(file, STDERR_FILENO);
     script = play;
     const int code = relay_run(&relay, &settings);
-    (void)dup2(kept, STDERR_FILENO);
-    (void)close(kept);
+    (void)dup2(saved, STDERR_FILENO);
+    (void)close(saved);
     const ssize_t length = pread(file, complaints, sizeof complaints - 1U, 0);
     complaints[(length > 0) ? length : 0] = '\0';
     (void)close(file);

@@ -106,7 +106,7 @@ TEST(test_round_continues_after_the_last_served_client) {
         TEST_ASSERT_GREATER_THAN_UINT(before, served());
         TEST_ASSERT_LESS_THAN_UINT(CROWD, rounds);
         for (unsigned i = 0; i < served(); i++) {
-            TEST_ASSERT_TRUE_MESSAGE(is_served(i), "in order, nobody twice before everybody once");
+            TEST_ASSERT_TRUE_MESSAGE(is_served(i), "in order, no client twice before each client once");
         }
         before = served();
     }
@@ -147,11 +147,11 @@ TEST(test_lines_are_complete_and_in_order_for_a_slow_reader) {
     char line[64];
     char expected[sizeof line];
     size_t length = 0;
-    unsigned told = 0;
+    unsigned total = 0;
     unsigned read_back = 0;
     while (read_back < 20000U) {
         while (client->out_end - client->out_start < SOCK_OUT_SIZE - sizeof line) {
-            (void)snprintf(line, sizeof line, "{\"line\":%u,\"and\":\"something to fill it\"}\n", told++);
+            (void)snprintf(line, sizeof line, "{\"line\":%u,\"and\":\"something to fill it\"}\n", total++);
             sock_client_reply(client, line, strlen(line));
         }
         TEST_ASSERT_FALSE(sock_client_is_broken(client));

@@ -29,7 +29,7 @@ static void command_at(iw_time_us_t now_us, int16_t left_mm_s, int16_t right_mm_
     iw_setpoint_command(&setpoint, now_us, &target);
 }
 
-/// Takes every pair when it is due, until `until_us`, and returns the time of the last one.
+/// Sends every pair when it is due, until `until_us`, and returns the time of the last one.
 static iw_time_us_t run_until(iw_time_us_t until_us) {
     iw_time_us_t last_us = 0;
     while (iw_setpoint_next_us(&setpoint) <= until_us) {

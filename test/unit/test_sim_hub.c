@@ -53,7 +53,7 @@ static int open_socket(const char *path, int type) {
         }
         (void)poll(NULL, 0U, 1);
     }
-    TEST_FAIL_MESSAGE("nobody listens");
+    TEST_FAIL_MESSAGE("there is no listener");
     return -1;
 }
 
@@ -98,7 +98,7 @@ static size_t receive(int fd, void *out, size_t size) {
     return (length > 0) ? (size_t)length : 0U;
 }
 
-static const char *tell(const char *command) {
+static const char *execute(const char *command) {
     static char answer[SIM_ANSWER_BYTES];
     int const fd = open_socket(options.control_path, SOCK_STREAM);
     (void)send(fd, command, strlen(command), MSG_NOSIGNAL);
@@ -148,12 +148,12 @@ TEST(test_hub_stalled_reader_loses_frames_and_others_none) {
     start();
     int const stalled = open_socket(options.can_path, SOCK_SEQPACKET);
     int const reader = open_socket(options.can_path, SOCK_SEQPACKET);
-    TEST_ASSERT_EQUAL_STRING("ok\n", tell("babble 7FE 200 on"));
+    TEST_ASSERT_EQUAL_STRING("ok\n", execute("babble 7FE 200 on"));
     for (unsigned i = 0U; i < 1000U; i++) {
         (void)wait_for_frame(reader, 0x7FEU, &frame);
     }
-    TEST_ASSERT_NOT_NULL(strstr(tell("status"), "\"clients\":2"));
-    TEST_ASSERT_NULL(strstr(tell("status"), "\"lost_by_readers\":0"));
+    TEST_ASSERT_NOT_NULL(strstr(execute("status"), "\"clients\":2"));
+    TEST_ASSERT_NULL(strstr(execute("status"), "\"lost_by_readers\":0"));
     (void)close(stalled);
     (void)close(reader);
 }
@@ -169,7 +169,7 @@ TEST(test_hub_malformed_messages_are_counted_only) {
     (void)send(fd, junk, sizeof(struct can_frame), MSG_NOSIGNAL);
     send_setpoint(fd);
     TEST_ASSERT_EQUAL_INT(1, wait_for_frame(fd, 266U, &frame));
-    TEST_ASSERT_NOT_NULL(strstr(tell("status"), "\"malformed\":3"));
+    TEST_ASSERT_NOT_NULL(strstr(execute("status"), "\"malformed\":3"));
     (void)close(fd);
 }
 
@@ -177,10 +177,10 @@ TEST(test_hub_sends_bus_off_and_restart_and_nothing_between) {
     struct can_frame frame;
     start();
     int const fd = open_socket(options.can_path, SOCK_SEQPACKET);
-    TEST_ASSERT_EQUAL_STRING("ok\n", tell("busoff on"));
+    TEST_ASSERT_EQUAL_STRING("ok\n", execute("busoff on"));
     (void)wait_for_frame(fd, CAN_ERR_FLAG | CAN_ERR_BUSOFF, &frame);
     (void)poll(NULL, 0U, 50);
-    TEST_ASSERT_EQUAL_STRING("ok\n", tell("busoff off"));
+    TEST_ASSERT_EQUAL_STRING("ok\n", execute("busoff off"));
     TEST_ASSERT_EQUAL_size_t(sizeof frame, receive(fd, &frame, sizeof frame));
     TEST_ASSERT_EQUAL_HEX32(CAN_ERR_FLAG | CAN_ERR_RESTARTED, frame.can_id);
     (void)wait_for_frame(fd, 256U, &frame);
@@ -190,7 +190,7 @@ TEST(test_hub_sends_bus_off_and_restart_and_nothing_between) {
 TEST(test_hub_late_client_receives_bus_off) {
     struct can_frame frame;
     start();
-    TEST_ASSERT_EQUAL_STRING("ok\n", tell("busoff on"));
+    TEST_ASSERT_EQUAL_STRING("ok\n", execute("busoff on"));
     int const fd = open_socket(options.can_path, SOCK_SEQPACKET);
     TEST_ASSERT_EQUAL_size_t(sizeof frame, receive(fd, &frame, sizeof frame));
     TEST_ASSERT_EQUAL_HEX32(CAN_ERR_FLAG | CAN_ERR_BUSOFF, frame.can_id);
@@ -219,13 +219,13 @@ TEST(test_hub_bus_down_closes_connections_until_it_is_up) {
     struct can_frame frame;
     start();
     int fd = open_socket(options.can_path, SOCK_SEQPACKET);
-    TEST_ASSERT_EQUAL_STRING("ok\n", tell("bus down"));
+    TEST_ASSERT_EQUAL_STRING("ok\n", execute("bus down"));
     TEST_ASSERT_EQUAL_INT(-1, wait_for_frame(fd, 0x7FFU, &frame));
     (void)close(fd);
     fd = open_socket(options.can_path, SOCK_SEQPACKET);
     TEST_ASSERT_EQUAL_size_t(0U, receive(fd, &frame, sizeof frame));
     (void)close(fd);
-    TEST_ASSERT_EQUAL_STRING("ok\n", tell("bus up"));
+    TEST_ASSERT_EQUAL_STRING("ok\n", execute("bus up"));
     fd = open_socket(options.can_path, SOCK_SEQPACKET);
     (void)wait_for_frame(fd, 256U, &frame);
     (void)close(fd);
@@ -237,20 +237,20 @@ TEST(test_button_sends_its_state_on_connect_and_at_every_change) {
     int const fd = open_socket(options.estop_path, SOCK_STREAM);
     TEST_ASSERT_EQUAL_size_t(1U, receive(fd, &state, 1U));
     TEST_ASSERT_EQUAL_CHAR('0', state);
-    TEST_ASSERT_EQUAL_STRING("ok\n", tell("estop pulse 5"));
+    TEST_ASSERT_EQUAL_STRING("ok\n", execute("estop pulse 5"));
     TEST_ASSERT_EQUAL_size_t(1U, receive(fd, &state, 1U));
     TEST_ASSERT_EQUAL_CHAR('1', state);
     TEST_ASSERT_EQUAL_size_t(1U, receive(fd, &state, 1U));
     TEST_ASSERT_EQUAL_CHAR('0', state);
-    TEST_ASSERT_EQUAL_STRING("ok\n", tell("estop press"));
-    TEST_ASSERT_EQUAL_STRING("ok\n", tell("estop press"));
+    TEST_ASSERT_EQUAL_STRING("ok\n", execute("estop press"));
+    TEST_ASSERT_EQUAL_STRING("ok\n", execute("estop press"));
     TEST_ASSERT_EQUAL_size_t(1U, receive(fd, &state, 1U));
     TEST_ASSERT_EQUAL_INT(-1, recv(fd, &state, 1U, MSG_DONTWAIT));
-    TEST_ASSERT_EQUAL_STRING_LEN("error ", tell("estop pulse 5"), 6);
+    TEST_ASSERT_EQUAL_STRING_LEN("error ", execute("estop pulse 5"), 6);
     int const late = open_socket(options.estop_path, SOCK_STREAM);
     TEST_ASSERT_EQUAL_size_t(1U, receive(late, &state, 1U));
     TEST_ASSERT_EQUAL_CHAR('1', state);
-    TEST_ASSERT_EQUAL_STRING("ok\n", tell("estop unplug"));
+    TEST_ASSERT_EQUAL_STRING("ok\n", execute("estop unplug"));
     TEST_ASSERT_EQUAL_size_t(0U, receive(late, &state, 1U));
     (void)close(fd);
     (void)close(late);
@@ -282,7 +282,7 @@ TEST(test_control_line_without_end_is_refused_and_closed) {
     (void)receive(fd, answer, sizeof answer - 1U);
     TEST_ASSERT_EQUAL_STRING_LEN("error the line is longer", answer, 24);
     (void)close(fd);
-    TEST_ASSERT_EQUAL_STRING("ok\n", tell("power on"));
+    TEST_ASSERT_EQUAL_STRING("ok\n", execute("power on"));
 }
 
 TEST(test_control_nul_in_a_line_is_refused) {
@@ -311,14 +311,14 @@ TEST(test_simulator_replaces_sockets_of_a_killed_one) {
     TEST_ASSERT_EQUAL_INT(-SIGKILL, end(SIGKILL));
     TEST_ASSERT_EQUAL_INT(0, access(options.can_path, F_OK));
     start();
-    TEST_ASSERT_EQUAL_STRING("ok\n", tell("power on"));
+    TEST_ASSERT_EQUAL_STRING("ok\n", execute("power on"));
 }
 
 TEST(test_simulator_second_on_the_same_bus_exits_with_an_error) {
     start();
     (void)freopen("/dev/null", "w", stderr);
     TEST_ASSERT_EQUAL_INT(EX_UNAVAILABLE, run_simulator());
-    TEST_ASSERT_EQUAL_STRING("ok\n", tell("power on"));
+    TEST_ASSERT_EQUAL_STRING("ok\n", execute("power on"));
     (void)close(open_socket(options.can_path, SOCK_SEQPACKET));
 }
 

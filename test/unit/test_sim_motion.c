@@ -23,7 +23,7 @@ static void restart(void) {
     sim_motion_init(&motion, &config, START_US);
 }
 
-static bool tell(iw_time_us_t now_us, int16_t speed_mm_s, int16_t current_mA) {
+static bool command(iw_time_us_t now_us, int16_t speed_mm_s, int16_t current_mA) {
     iw_codec_setpoint_t const setpoint = {speed_mm_s, current_mA, 1U};
     return sim_motion_receive(&motion, now_us, &setpoint);
 }
@@ -32,7 +32,7 @@ static bool tell(iw_time_us_t now_us, int16_t speed_mm_s, int16_t current_mA) {
 static iw_time_us_t drive(iw_time_us_t from_us, uint32_t ms, int16_t speed_mm_s, int16_t current_mA) {
     iw_time_us_t now_us = from_us;
     for (; now_us < from_us + (iw_time_us_t)ms * MS; now_us += 20U * MS) {
-        TEST_ASSERT_TRUE(tell(now_us, speed_mm_s, current_mA));
+        TEST_ASSERT_TRUE(command(now_us, speed_mm_s, current_mA));
     }
     sim_motion_advance(&motion, now_us);
     return now_us;
@@ -107,7 +107,7 @@ TEST(test_motion_without_a_setpoint_stays_at_standstill) {
 TEST(test_motion_reaches_the_commanded_speed_without_overshoot) {
     iw_time_us_t now_us = START_US;
     for (; now_us < START_US + 1500U * MS; now_us += 20U * MS) {
-        (void)tell(now_us, 500, 2000);
+        (void)command(now_us, 500, 2000);
         TEST_ASSERT_LESS_OR_EQUAL_INT32(500000, motion.speed_um_s);
     }
     TEST_ASSERT_INT32_WITHIN(500, 500000, motion.speed_um_s);
@@ -137,7 +137,7 @@ TEST(test_motion_with_a_current_limit_of_zero_coasts) {
 
 TEST(test_motion_setpoint_is_valid_for_one_second) {
     iw_time_us_t const last_us = drive(START_US, 1500U, 1000, 2000);
-    TEST_ASSERT_TRUE(tell(last_us, 1000, 2000));
+    TEST_ASSERT_TRUE(command(last_us, 1000, 2000));
     sim_motion_advance(&motion, last_us + 999999U);
     TEST_ASSERT_TRUE(motion.driven);
     TEST_ASSERT_INT32_WITHIN(500, 1000000, motion.speed_um_s);
@@ -323,7 +323,7 @@ TEST(test_motion_push_moves_the_wheel_by_the_exact_distance) {
 }
 
 TEST(test_motion_push_overrides_the_motor_and_ends) {
-    TEST_ASSERT_TRUE(tell(START_US, 500, 2000));
+    TEST_ASSERT_TRUE(command(START_US, 500, 2000));
     sim_motion_push(&motion, START_US, -100);
     sim_motion_advance(&motion, START_US + 40U * MS);
     TEST_ASSERT_EQUAL_INT32(-1500000, motion.speed_um_s);

@@ -431,8 +431,8 @@ TEST(test_panel_commands_reach_the_side_they_name) {
 }
 
 TEST(test_panel_mark_and_quit_call_their_hooks) {
-    TEST_ASSERT_EQUAL_INT(SIM_ASKED, sim_panel_execute(&panel, NOW_US, "log mark  the   judge looks here"));
-    TEST_ASSERT_EQUAL_STRING("the judge looks here", marked);
+    TEST_ASSERT_EQUAL_INT(SIM_ASKED, sim_panel_execute(&panel, NOW_US, "log mark  the   judge reads this"));
+    TEST_ASSERT_EQUAL_STRING("the judge reads this", marked);
     expect_done("quit");
     TEST_ASSERT_EQUAL_UINT(1U, quits);
 }

@@ -29,9 +29,9 @@ static iw_can_frame_t frame_of(uint32_t id, uint8_t dlc) {
 }
 
 static iw_can_frame_t setpoint(iw_side_t side, int16_t speed_mm_s) {
-    iw_codec_setpoint_t const told = {speed_mm_s, 2000, 1U};
+    iw_codec_setpoint_t const command = {speed_mm_s, 2000, 1U};
     iw_can_frame_t frame;
-    (void)iw_codec_encode_setpoint(side, &told, IW_DLC_SETPOINT, &frame);
+    (void)iw_codec_encode_setpoint(side, &command, IW_DLC_SETPOINT, &frame);
     return frame;
 }
 
@@ -92,13 +92,13 @@ static uint32_t sleep_until(iw_time_us_t until_us, iw_time_us_t (*wake_us)(const
 TEST(test_world_woken_at_frame_ends_delivers_the_same_frames) {
     static sim_delivery_t every_step[HISTORY];
     uint32_t const wakes = sleep_until(START_US + 3U * SECOND, sim_world_next_us);
-    uint32_t const told = count;
+    uint32_t const command = count;
     memcpy(every_step, history, sizeof history);
     setUp();
     uint32_t const fewer = sleep_until(START_US + 3U * SECOND + SIM_WORLD_FRAME_US, sim_world_wake_us);
-    TEST_ASSERT_GREATER_THAN_UINT32(1000U, told);
-    TEST_ASSERT_UINT32_WITHIN(2U, told, count);
-    for (uint32_t i = 0U; i < told; i++) {
+    TEST_ASSERT_GREATER_THAN_UINT32(1000U, command);
+    TEST_ASSERT_UINT32_WITHIN(2U, command, count);
+    for (uint32_t i = 0U; i < command; i++) {
         TEST_ASSERT_EQUAL_UINT64(every_step[i].end_us, history[i].end_us);
         TEST_ASSERT_EQUAL_UINT32(every_step[i].frame.id, history[i].frame.id);
         TEST_ASSERT_EQUAL_UINT8_ARRAY(every_step[i].frame.data, history[i].frame.data, IW_CAN_DATA_MAX);
@@ -278,7 +278,7 @@ TEST(test_world_babbling_high_id_delays_others_by_one_frame) {
     TEST_ASSERT_EQUAL_UINT32(20U, setpoints);
 }
 
-static void plant_everything(void) {
+static void apply_every_fault(void) {
     for (unsigned side = 0U; side < IW_SIDES; side++) {
         sim_wheel_t *const wheel = &world.pair.wheel[side];
         wheel->muted = true;
@@ -303,7 +303,7 @@ static void plant_everything(void) {
 
 TEST(test_world_heal_undoes_every_fault) {
     run_until(START_US + SECOND);
-    plant_everything();
+    apply_every_fault();
     sim_world_heal(&world, START_US + SECOND);
     uint8_t const port = sim_world_connect(&world);
     (void)drive(port, START_US + 2U * SECOND, START_US + 4U * SECOND, 300);

@@ -131,7 +131,7 @@ static iw_snapshot_t look_at(iw_time_us_t now_us) {
     return seen;
 }
 
-static iw_snapshot_t look(void) {
+static iw_snapshot_t snapshot(void) {
     return look_at(rig.now_us);
 }
 
@@ -153,7 +153,7 @@ TEST(test_snapshot_no_field_is_missing_in_this_test) {
 }
 
 TEST(test_snapshot_before_the_first_frame_has_no_telemetry) {
-    const iw_snapshot_t seen = look();
+    const iw_snapshot_t seen = snapshot();
     for (size_t side = 0; side < IW_SIDES; side++) {
         TEST_ASSERT_EQUAL_UINT64(IW_NEVER, seen.wheel[side].speed_us);
         TEST_ASSERT_EQUAL_UINT64(IW_NEVER, seen.wheel[side].status_us);
@@ -223,7 +223,7 @@ TEST(test_snapshot_arming_has_its_client_and_start_time) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_request_arm(&rig, HOLDER, false));
     const iw_time_us_t asked_us = rig.now_us;
     gateway_rig_run(&rig, MS(10));
-    const iw_snapshot_t seen = look();
+    const iw_snapshot_t seen = snapshot();
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, seen.state);
     TEST_ASSERT_TRUE(seen.arming);
     TEST_ASSERT_TRUE(iw_gateway_is_sending(&rig.gateway));
@@ -239,21 +239,21 @@ TEST(test_snapshot_confirmed_is_the_older_of_both_wheels) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_request_arm(&rig, HOLDER, false));
     const iw_time_us_t first_us = rig.now_us;
     gateway_rig_run(&rig, MS(2)); // The echo of the left wheel has arrived, that of the right wheel has not.
-    TEST_ASSERT_EQUAL_UINT64(0, look().confirmed_us);
+    TEST_ASSERT_EQUAL_UINT64(0, snapshot().confirmed_us);
     gateway_rig_run(&rig, FAKE_BUS_FRAME_US);
-    TEST_ASSERT_EQUAL_UINT64(first_us, look().confirmed_us);
-    TEST_ASSERT_EQUAL_UINT64(IW_NEVER, look().waiting_us);
-    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, look().state);
+    TEST_ASSERT_EQUAL_UINT64(first_us, snapshot().confirmed_us);
+    TEST_ASSERT_EQUAL_UINT64(IW_NEVER, snapshot().waiting_us);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, snapshot().state);
 }
 
 TEST(test_snapshot_armed_shows_command_ramp_and_lease) {
     gateway_rig_arm(&rig);
-    const iw_snapshot_t armed = look();
+    const iw_snapshot_t armed = snapshot();
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, armed.state);
     TEST_ASSERT_FALSE(armed.arming);
     TEST_ASSERT_EQUAL_UINT64(armed.armed_us + MS(1000), armed.lease_until_us);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_cruise(&rig, 300, -150, MS(200)));
-    const iw_snapshot_t seen = look();
+    const iw_snapshot_t seen = snapshot();
     TEST_ASSERT_EQUAL_INT16(300, seen.target.wheel[IW_LEFT].speed_mm_s);
     TEST_ASSERT_EQUAL_INT16(-150, seen.target.wheel[IW_RIGHT].speed_mm_s);
     TEST_ASSERT_INT16_WITHIN(50, 140, seen.applied.wheel[IW_LEFT].speed_mm_s);
@@ -272,7 +272,7 @@ TEST(test_snapshot_braking_has_the_stop_and_the_applied_pair) {
     (void)gateway_rig_cruise(&rig, 400, 400, MS(400));
     gateway_rig_stop(&rig);
     gateway_rig_run(&rig, MS(50));
-    const iw_snapshot_t seen = look();
+    const iw_snapshot_t seen = snapshot();
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, seen.state);
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_BRAKE, seen.demand);
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_CLIENT_STOP, seen.stop->cause);
@@ -290,7 +290,7 @@ TEST(test_snapshot_latched_has_a_cause_while_it_prevents_reset) {
     iw_gateway_estop(&rig.gateway, rig.now_us, OTHER);
     const iw_time_us_t pressed_us = rig.now_us;
     gateway_rig_step(&rig);
-    const iw_snapshot_t seen = look();
+    const iw_snapshot_t seen = snapshot();
     TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, seen.state);
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, seen.demand);
     TEST_ASSERT_TRUE(seen.output_zero);
@@ -299,8 +299,8 @@ TEST(test_snapshot_latched_has_a_cause_while_it_prevents_reset) {
     TEST_ASSERT_EQUAL_HEX32(bit, look_at(pressed_us + MS(1000) - 1U).present);
     TEST_ASSERT_EQUAL_HEX32(0, look_at(pressed_us + MS(1000)).present);
     gateway_rig_run(&rig, MS(5000));
-    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, look().state);
-    TEST_ASSERT_EQUAL_INT(IW_DEMAND_SILENCE, look().demand);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, snapshot().state);
+    TEST_ASSERT_EQUAL_INT(IW_DEMAND_SILENCE, snapshot().demand);
     TEST_ASSERT_FALSE(iw_gateway_is_sending(&rig.gateway));
 }
 
@@ -309,31 +309,31 @@ TEST(test_snapshot_after_a_reboot_has_no_status_until_a_new_one) {
     gateway_rig_run(&rig, MS(100));
     rig.wheel[IW_RIGHT].mute = true;
     gateway_rig_run(&rig, MS(1100));
-    TEST_ASSERT_FALSE(look().wheel[IW_RIGHT].heard);
+    TEST_ASSERT_FALSE(snapshot().wheel[IW_RIGHT].heard);
     rig.wheel[IW_RIGHT].mute = false;
     rig.wheel[IW_RIGHT].status_us = rig.now_us + MS(20);
     gateway_rig_run(&rig, MS(10));
-    const iw_snapshot_t back = look();
+    const iw_snapshot_t back = snapshot();
     TEST_ASSERT_EQUAL_UINT32(1, back.wheel[IW_RIGHT].reboots);
     TEST_ASSERT_EQUAL_UINT32(0, back.wheel[IW_LEFT].reboots);
     TEST_ASSERT_EQUAL_UINT64(IW_NEVER, back.wheel[IW_RIGHT].status_us);
     TEST_ASSERT_TRUE(back.wheel[IW_RIGHT].heard);
     TEST_ASSERT_EQUAL_HEX32(1U << IW_CAUSE_WHEEL_REBOOTED, back.present);
     gateway_rig_run(&rig, MS(11));
-    TEST_ASSERT_TRUE(look().at_us - look().wheel[IW_RIGHT].status_us <= MS(1));
+    TEST_ASSERT_TRUE(snapshot().at_us - snapshot().wheel[IW_RIGHT].status_us <= MS(1));
 }
 
 TEST(test_snapshot_doubt_is_the_first_blocking_contradiction) {
     const iw_assumption_entry_t wrong = {IW_CONTRADICTED, IW_SOURCE_OPERATOR, 0};
-    const uint32_t changes = look().assumed_changes;
+    const uint32_t changes = snapshot().assumed_changes;
     iw_gateway_set_assumption(&rig.gateway, IW_ASSUMPTION_GEAR_RATIO, &wrong);
-    TEST_ASSERT_EQUAL_INT(IW_ASSUMPTION_ITEMS, look().doubt);
+    TEST_ASSERT_EQUAL_INT(IW_ASSUMPTION_ITEMS, snapshot().doubt);
     iw_gateway_set_assumption(&rig.gateway, IW_ASSUMPTION_MOUNT_SIGN_LEFT, &wrong);
-    TEST_ASSERT_EQUAL_INT(IW_ASSUMPTION_MOUNT_SIGN_LEFT, look().doubt);
+    TEST_ASSERT_EQUAL_INT(IW_ASSUMPTION_MOUNT_SIGN_LEFT, snapshot().doubt);
     iw_gateway_set_assumption(&rig.gateway, IW_ASSUMPTION_CURRENT_ROLE, &wrong);
-    TEST_ASSERT_EQUAL_INT(IW_ASSUMPTION_CURRENT_ROLE, look().doubt);
-    TEST_ASSERT_EQUAL_UINT32(changes + 3U, look().assumed_changes);
-    TEST_ASSERT_EQUAL_INT(IW_CONTRADICTED, look().assumed[IW_ASSUMPTION_GEAR_RATIO].state);
+    TEST_ASSERT_EQUAL_INT(IW_ASSUMPTION_CURRENT_ROLE, snapshot().doubt);
+    TEST_ASSERT_EQUAL_UINT32(changes + 3U, snapshot().assumed_changes);
+    TEST_ASSERT_EQUAL_INT(IW_CONTRADICTED, snapshot().assumed[IW_ASSUMPTION_GEAR_RATIO].state);
 }
 
 TEST(test_snapshot_failed_arming_has_refusal_and_left_behind) {
@@ -344,7 +344,7 @@ TEST(test_snapshot_failed_arming_has_refusal_and_left_behind) {
     rig.bus.purge_result = -1;
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_request_arm(&rig, HOLDER, false));
     gateway_rig_run(&rig, MS(100));
-    const iw_snapshot_t seen = look();
+    const iw_snapshot_t seen = snapshot();
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_SEND_STALLED, seen.arm_refusal);
     TEST_ASSERT_TRUE(seen.left_behind);
     TEST_ASSERT_TRUE(seen.echo_proven);
@@ -362,7 +362,7 @@ TEST(test_snapshot_counters_of_sending_are_not_exchanged) {
     rig.gateway.diverge.path_um = -1006999;
     rig.gateway.diverge.largest_um = 1006999;
     rig.gateway.rolling.rolling = true;
-    const iw_snapshot_t seen = look();
+    const iw_snapshot_t seen = snapshot();
     TEST_ASSERT_EQUAL_UINT32(101, seen.sent->later);
     TEST_ASSERT_EQUAL_UINT32(102, seen.sent->clamped);
     TEST_ASSERT_EQUAL_UINT32(103, seen.stopped);
@@ -374,6 +374,6 @@ TEST(test_snapshot_counters_of_sending_are_not_exchanged) {
     TEST_ASSERT_FALSE(seen.rolling_fault);
     rig.gateway.rolling.rolling = false;
     rig.gateway.rolling.is_fault = true;
-    TEST_ASSERT_TRUE(look().rolling_fault);
-    TEST_ASSERT_FALSE(look().rolling);
+    TEST_ASSERT_TRUE(snapshot().rolling_fault);
+    TEST_ASSERT_FALSE(snapshot().rolling);
 }

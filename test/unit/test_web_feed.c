@@ -27,7 +27,7 @@ void tearDown(void) {
     web_feed_free(&feed);
 }
 
-static const char *take(size_t size) {
+static const char *read_out(size_t size) {
     out[web_reader_take(&reader, &feed, out, size)] = '\0';
     return out;
 }
@@ -41,10 +41,10 @@ TEST(test_reader_gets_events_in_order_and_then_the_state) {
     add("stop", "{\"b\":2}");
     add("fault", "{\"c\":3}");
     TEST_ASSERT_TRUE(web_reader_waits(&reader, &feed));
-    TEST_ASSERT_EQUAL_STRING("event: stop\ndata: {\"b\":2}\n\n", take(1000));
-    TEST_ASSERT_EQUAL_STRING("event: fault\ndata: {\"c\":3}\n\n", take(1000));
-    TEST_ASSERT_EQUAL_STRING("event: state\ndata: {\"a\":1}\n\n", take(1000));
-    TEST_ASSERT_EQUAL_STRING("", take(1000));
+    TEST_ASSERT_EQUAL_STRING("event: stop\ndata: {\"b\":2}\n\n", read_out(1000));
+    TEST_ASSERT_EQUAL_STRING("event: fault\ndata: {\"c\":3}\n\n", read_out(1000));
+    TEST_ASSERT_EQUAL_STRING("event: state\ndata: {\"a\":1}\n\n", read_out(1000));
+    TEST_ASSERT_EQUAL_STRING("", read_out(1000));
     TEST_ASSERT_FALSE(web_reader_waits(&reader, &feed));
 }
 
@@ -53,43 +53,43 @@ TEST(test_reader_slow_gets_the_newest_state_only) {
         const char json[] = {'{', '"', i, '"', ':', i, '}', '\0'};
         add("state", json);
     }
-    TEST_ASSERT_EQUAL_STRING("event: state\ndata: {\"9\":9}\n\n", take(1000));
-    TEST_ASSERT_EQUAL_STRING("", take(1000));
+    TEST_ASSERT_EQUAL_STRING("event: state\ndata: {\"9\":9}\n\n", read_out(1000));
+    TEST_ASSERT_EQUAL_STRING("", read_out(1000));
 }
 
 TEST(test_reader_within_a_state_gets_its_end_then_the_newest) {
     add("state", "{\"a\":1}");
-    TEST_ASSERT_EQUAL_STRING("event", take(5));
+    TEST_ASSERT_EQUAL_STRING("event", read_out(5));
     add("state", "{\"a\":2}");
     add("state", "{\"a\":3}");
-    TEST_ASSERT_EQUAL_STRING(": state\ndata: {\"a\":1}\n\n", take(1000));
-    TEST_ASSERT_EQUAL_STRING("event: state\ndata: {\"a\":3}\n\n", take(1000));
+    TEST_ASSERT_EQUAL_STRING(": state\ndata: {\"a\":1}\n\n", read_out(1000));
+    TEST_ASSERT_EQUAL_STRING("event: state\ndata: {\"a\":3}\n\n", read_out(1000));
 }
 
 TEST(test_reader_too_slow_gets_the_count_of_lost_events) {
     for (unsigned i = 0; i < WEB_FEED_STORED + 7U; i++) {
         add("bus", "{}");
     }
-    TEST_ASSERT_EQUAL_STRING("event: lost\ndata: {\"event\":\"lost\",\"count\":7}\n\n", take(1000));
+    TEST_ASSERT_EQUAL_STRING("event: lost\ndata: {\"event\":\"lost\",\"count\":7}\n\n", read_out(1000));
     for (unsigned i = 0; i < WEB_FEED_STORED; i++) {
-        TEST_ASSERT_EQUAL_STRING("event: bus\ndata: {}\n\n", take(1000));
+        TEST_ASSERT_EQUAL_STRING("event: bus\ndata: {}\n\n", read_out(1000));
     }
-    TEST_ASSERT_EQUAL_STRING("", take(1000));
+    TEST_ASSERT_EQUAL_STRING("", read_out(1000));
 }
 
 TEST(test_reader_new_gets_the_newest_state_and_no_old_event) {
     add("stop", "{}");
     add("state", "{\"a\":1}");
     web_reader_begin(&reader, &feed);
-    TEST_ASSERT_EQUAL_STRING("event: state\ndata: {\"a\":1}\n\n", take(1000));
-    TEST_ASSERT_EQUAL_STRING("", take(1000));
+    TEST_ASSERT_EQUAL_STRING("event: state\ndata: {\"a\":1}\n\n", read_out(1000));
+    TEST_ASSERT_EQUAL_STRING("", read_out(1000));
 }
 
 TEST(test_reader_gets_no_state_that_was_cleared) {
     add("state", "{\"a\":1}");
     web_feed_forget(&feed);
     TEST_ASSERT_FALSE(web_reader_waits(&reader, &feed));
-    TEST_ASSERT_EQUAL_STRING("", take(1000));
+    TEST_ASSERT_EQUAL_STRING("", read_out(1000));
 }
 
 // ---- metrics --------------------------------------------------------------------------------------------------------
@@ -236,20 +236,20 @@ TEST(test_settings_for_other_machines_are_accepted_with_tls) {
 
 static char folder[] = "/tmp/iwheel-token-XXXXXX";
 static char path[64];
-static FILE *silent;
+static FILE *null;
 
 static void begin_token(web_token_t *token, uint32_t hours) {
     memcpy(strrchr(folder, '-'), "-XXXXXX", 8);
     TEST_ASSERT_NOT_NULL(mkdtemp(folder));
     (void)snprintf(path, sizeof path, "%s/token", folder);
-    silent = fopen("/dev/null", "w");
+    null = fopen("/dev/null", "w");
     *token = (web_token_t){.path = path, .hours = hours};
 }
 
 static void end_token(void) {
     (void)unlink(path);
     (void)rmdir(folder);
-    (void)fclose(silent);
+    (void)fclose(null);
 }
 
 TEST(test_token_is_created_for_the_bridge_alone_and_stays) {
@@ -258,15 +258,15 @@ TEST(test_token_is_created_for_the_bridge_alone_and_stays) {
     struct stat status;
     bool changed = false;
     begin_token(&token, 0);
-    TEST_ASSERT_TRUE(web_token_refresh(&token, &changed, silent));
+    TEST_ASSERT_TRUE(web_token_refresh(&token, &changed, null));
     TEST_ASSERT_TRUE(changed);
     TEST_ASSERT_EQUAL_size_t(WEB_TOKEN_SIZE - 1U, strlen(token.text));
     TEST_ASSERT_EQUAL_INT(0, stat(path, &status));
     TEST_ASSERT_EQUAL_HEX(0600, status.st_mode & 07777U);
     other = (web_token_t){.path = path};
-    TEST_ASSERT_TRUE(web_token_refresh(&other, &changed, silent));
+    TEST_ASSERT_TRUE(web_token_refresh(&other, &changed, null));
     TEST_ASSERT_EQUAL_STRING(token.text, other.text);
-    TEST_ASSERT_TRUE(web_token_refresh(&token, &changed, silent));
+    TEST_ASSERT_TRUE(web_token_refresh(&token, &changed, null));
     TEST_ASSERT_FALSE(changed);
     end_token();
 }
@@ -276,15 +276,15 @@ TEST(test_token_that_is_deleted_or_expired_is_replaced) {
     char before[WEB_TOKEN_SIZE];
     bool changed = false;
     begin_token(&token, 1);
-    TEST_ASSERT_TRUE(web_token_refresh(&token, &changed, silent));
+    TEST_ASSERT_TRUE(web_token_refresh(&token, &changed, null));
     memcpy(before, token.text, sizeof before);
     TEST_ASSERT_EQUAL_INT(0, unlink(path));
-    TEST_ASSERT_TRUE(web_token_refresh(&token, &changed, silent));
+    TEST_ASSERT_TRUE(web_token_refresh(&token, &changed, null));
     TEST_ASSERT_TRUE(changed && strcmp(before, token.text) != 0);
     memcpy(before, token.text, sizeof before);
     const struct utimbuf old = {time(NULL) - 3601, time(NULL) - 3601};
     TEST_ASSERT_EQUAL_INT(0, utime(path, &old));
-    TEST_ASSERT_TRUE(web_token_refresh(&token, &changed, silent));
+    TEST_ASSERT_TRUE(web_token_refresh(&token, &changed, null));
     TEST_ASSERT_TRUE(changed && strcmp(before, token.text) != 0);
     end_token();
 }
@@ -293,9 +293,9 @@ TEST(test_token_that_others_can_read_is_refused) {
     web_token_t token;
     bool changed = false;
     begin_token(&token, 0);
-    TEST_ASSERT_TRUE(web_token_refresh(&token, &changed, silent));
+    TEST_ASSERT_TRUE(web_token_refresh(&token, &changed, null));
     TEST_ASSERT_EQUAL_INT(0, chmod(path, 0640));
-    TEST_ASSERT_FALSE(web_token_refresh(&token, &changed, silent));
+    TEST_ASSERT_FALSE(web_token_refresh(&token, &changed, null));
     end_token();
 }
 
@@ -304,14 +304,14 @@ TEST(test_token_that_is_only_read_is_never_created) {
     bool changed = false;
     begin_token(&token, 1);
     token.only_reads = true;
-    TEST_ASSERT_FALSE(web_token_refresh(&token, &changed, silent));
+    TEST_ASSERT_FALSE(web_token_refresh(&token, &changed, null));
     TEST_ASSERT_NOT_EQUAL(0, access(path, F_OK));
     token.only_reads = false;
-    TEST_ASSERT_TRUE(web_token_refresh(&token, &changed, silent));
+    TEST_ASSERT_TRUE(web_token_refresh(&token, &changed, null));
     const struct utimbuf old = {time(NULL) - 3601, time(NULL) - 3601};
     TEST_ASSERT_EQUAL_INT(0, utime(path, &old));
     token.only_reads = true;
-    TEST_ASSERT_TRUE(web_token_refresh(&token, &changed, silent));
+    TEST_ASSERT_TRUE(web_token_refresh(&token, &changed, null));
     TEST_ASSERT_FALSE(changed);
     end_token();
 }

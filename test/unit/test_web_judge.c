@@ -212,7 +212,7 @@ static web_driver_t driver;
 static const web_limits_t limits = {300, 300000};
 static web_command_t command;
 
-static const char *take(uint64_t now_us) {
+static const char *next_command(uint64_t now_us) {
     web_twist_t twist = {-1, -1};
     const char *why = web_driver_take(&driver, &command, &limits, now_us, &twist);
     TEST_ASSERT_EQUAL_INT32((why == NULL) ? 200 : -1, twist.v_mm_s);
@@ -227,33 +227,33 @@ static void begin(void) {
 
 TEST(test_drive_command_of_the_armed_page_is_accepted_once) {
     begin();
-    TEST_ASSERT_NULL(take(NOW));
-    TEST_ASSERT_NOT_NULL(take(NOW)); // The same command again.
+    TEST_ASSERT_NULL(next_command(NOW));
+    TEST_ASSERT_NOT_NULL(next_command(NOW)); // The same command again.
     command.sequence = "3";
-    TEST_ASSERT_NULL(take(NOW));
+    TEST_ASSERT_NULL(next_command(NOW));
     command.sequence = "2"; // Overtaken by sequence 3.
-    TEST_ASSERT_NOT_NULL(take(NOW));
+    TEST_ASSERT_NOT_NULL(next_command(NOW));
     TEST_ASSERT_EQUAL_UINT64(2, driver.dropped);
 }
 
 TEST(test_drive_command_late_or_from_the_future_is_dropped) {
     begin();
-    TEST_ASSERT_NOT_NULL(strstr(take(4900000U + 300001U), "too old"));
-    TEST_ASSERT_NOT_NULL(strstr(take(4900000U - WEB_AHEAD_US - 1U), "future"));
+    TEST_ASSERT_NOT_NULL(strstr(next_command(4900000U + 300001U), "too old"));
+    TEST_ASSERT_NOT_NULL(strstr(next_command(4900000U - WEB_AHEAD_US - 1U), "future"));
     TEST_ASSERT_EQUAL_INT64(0, driver.sequence);
-    TEST_ASSERT_NULL(take(4900000U + 300000U));
+    TEST_ASSERT_NULL(next_command(4900000U + 300000U));
     // The clock of this command was read after that of the bridge, which found the command waiting.
     command.sequence = "2";
-    TEST_ASSERT_NULL(take(4900000U - WEB_AHEAD_US));
+    TEST_ASSERT_NULL(next_command(4900000U - WEB_AHEAD_US));
 }
 
 TEST(test_drive_command_of_another_page_is_dropped) {
     begin();
     command.is_holders = false;
-    TEST_ASSERT_NOT_NULL(take(NOW));
+    TEST_ASSERT_NOT_NULL(next_command(NOW));
     command.is_holders = true;
     web_driver_end(&driver);
-    TEST_ASSERT_NOT_NULL(take(NOW));
+    TEST_ASSERT_NOT_NULL(next_command(NOW));
 }
 
 TEST(test_drive_command_beyond_limits_counts_as_motion) {
@@ -289,19 +289,19 @@ TEST(test_arm_and_reset_outside_their_age_limits_are_refused) {
 TEST(test_drive_command_beyond_the_configured_speed_is_dropped) {
     begin();
     command.v_mm_s = "301";
-    TEST_ASSERT_NOT_NULL(take(NOW));
+    TEST_ASSERT_NOT_NULL(next_command(NOW));
     command.v_mm_s = "200";
     command.yaw_mrad_s = "1001";
-    TEST_ASSERT_NOT_NULL(take(NOW));
+    TEST_ASSERT_NOT_NULL(next_command(NOW));
     command.yaw_mrad_s = NULL;
-    TEST_ASSERT_NOT_NULL(take(NOW));
+    TEST_ASSERT_NOT_NULL(next_command(NOW));
 }
 
 TEST(test_driver_without_commands_is_silent_until_it_ends) {
     begin();
     TEST_ASSERT_FALSE(web_driver_silent(&driver, NOW + WEB_FIRST_US - 1U));
     TEST_ASSERT_TRUE(web_driver_silent(&driver, NOW + WEB_FIRST_US));
-    TEST_ASSERT_NULL(take(NOW));
+    TEST_ASSERT_NULL(next_command(NOW));
     TEST_ASSERT_FALSE(web_driver_silent(&driver, NOW + WEB_SILENT_US - 1U));
     TEST_ASSERT_TRUE(web_driver_silent(&driver, NOW + WEB_SILENT_US));
     web_driver_end(&driver);

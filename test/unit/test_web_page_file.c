@@ -15,7 +15,7 @@ static const unsigned char packed[] = {0x1f, 0x8b, 0x08, 0x00, 0x00, 0x00, 0x00,
                                        0xc9, 0xc9, 0xe7, 0x02, 0x00, 0x20, 0x30, 0x3a, 0x36, 0x06, 0x00, 0x00, 0x00};
 static char folder[] = "/tmp/iwheel-page-XXXXXX";
 static char path[64];
-static char beside[64];
+static char packed_path[64];
 static page_file_t file;
 
 static void write_file(const char *name, const void *bytes, size_t length) {
@@ -28,13 +28,13 @@ static void write_file(const char *name, const void *bytes, size_t length) {
 void setUp(void) {
     memset(&file, 0, sizeof file);
     write_file(path, hello, sizeof hello - 1U);
-    write_file(beside, packed, sizeof packed);
+    write_file(packed_path, packed, sizeof packed);
 }
 
 void tearDown(void) {
     page_file_free(&file);
     (void)unlink(path);
-    (void)unlink(beside);
+    (void)unlink(packed_path);
 }
 
 static void test_page_file_is_read_with_its_packed_form_and_two_tags(void) {
@@ -57,16 +57,16 @@ static void test_page_file_packed_form_of_other_bytes_is_ignored(void) {
         static const size_t at[] = {0, 1, 18, 19, 20, 21, 22, 23, 24, 25};
         memcpy(other, packed, sizeof packed);
         other[at[i]] ^= 1U;
-        write_file(beside, other, sizeof other);
+        write_file(packed_path, other, sizeof other);
         TEST_ASSERT_TRUE(page_file_read(&file, path));
         TEST_ASSERT_NULL(file.packed.text);
         page_file_free(&file);
     }
-    write_file(beside, packed, 8);
+    write_file(packed_path, packed, 8);
     TEST_ASSERT_TRUE(page_file_read(&file, path));
     TEST_ASSERT_NULL(file.packed.text);
     page_file_free(&file);
-    (void)unlink(beside);
+    (void)unlink(packed_path);
     TEST_ASSERT_TRUE(page_file_read(&file, path));
     TEST_ASSERT_EQUAL_PTR(&file.plain, page_file_choose(&file, "gzip"));
 }
@@ -102,7 +102,7 @@ static void test_page_file_copy_is_recognized_by_its_tag_only(void) {
 int main(void) {
     TEST_ASSERT_NOT_NULL(mkdtemp(folder));
     (void)snprintf(path, sizeof path, "%s/page.js", folder);
-    (void)snprintf(beside, sizeof beside, "%s/page.js.gz", folder);
+    (void)snprintf(packed_path, sizeof packed_path, "%s/page.js.gz", folder);
     UNITY_BEGIN();
     RUN_TEST(test_page_file_is_read_with_its_packed_form_and_two_tags);
     RUN_TEST(test_page_file_missing_is_refused);

@@ -28,7 +28,7 @@ static void hear_as(int16_t rpm, bool fresh) {
     iw_wheel_receive(&wheel, now_us, message.kind, &message.as, fresh);
 }
 
-static void hear(int16_t rpm) {
+static void receive(int16_t rpm) {
     hear_as(rpm, true);
 }
 
@@ -49,7 +49,7 @@ static void hear_for(iw_time_us_t for_us, int16_t rpm) {
     const iw_time_us_t until_us = now_us + for_us;
     while (now_us + MS(4) <= until_us) {
         now_us += MS(4);
-        hear(rpm);
+        receive(rpm);
     }
     now_us = until_us;
 }
@@ -81,7 +81,7 @@ TEST(test_wheel_is_online_for_exactly_its_silence_limit) {
     for (size_t i = 0; i < 3; i++) {
         config.wheel_silent_ms = limits_ms[i];
         begin();
-        hear(5);
+        receive(5);
         TEST_ASSERT_TRUE(iw_wheel_online(&wheel, now_us));
         TEST_ASSERT_TRUE(iw_wheel_online(&wheel, now_us + MS(limits_ms[i]) - 1U));
         TEST_ASSERT_FALSE(iw_wheel_lost(&wheel, now_us + MS(limits_ms[i]) - 1U));
@@ -93,7 +93,7 @@ TEST(test_wheel_is_online_for_exactly_its_silence_limit) {
 
 TEST(test_wheel_stays_online_by_speed_frames_only) {
     static const iw_codec_kind_t others[] = {IW_CODEC_STATUS, IW_CODEC_FORCE, IW_CODEC_OFFSET, IW_CODEC_POSE};
-    hear(0);
+    receive(0);
     for (uint32_t n = 0; n < 40; n++) {
         now_us += MS(2);
         hear_other(others[n % 4U]);
@@ -108,16 +108,16 @@ TEST(test_wheel_is_not_online_by_frames_of_unknown_age) {
     TEST_ASSERT_TRUE(iw_wheel_lost(&wheel, now_us));
     TEST_ASSERT_EQUAL_INT(140, wheel.speed_mm_s);
     TEST_ASSERT_TRUE(wheel.speed_us == now_us);
-    hear(0);
+    receive(0);
     now_us += SILENT_US - 1U;
     hear_as(0, false);
     TEST_ASSERT_TRUE(iw_wheel_lost(&wheel, now_us + 1U));
-    hear(0);
+    receive(0);
     TEST_ASSERT_TRUE(iw_wheel_online(&wheel, now_us + 1U));
 }
 
 TEST(test_wheel_silence_during_our_stall_is_excused_once) {
-    hear(0);
+    receive(0);
     now_us += MS(300);
     iw_wheel_excuse(&wheel, now_us);
     TEST_ASSERT_FALSE(iw_wheel_lost(&wheel, now_us));
@@ -131,17 +131,17 @@ TEST(test_wheel_silence_during_our_stall_is_excused_once) {
 }
 
 TEST(test_wheel_is_excused_again_after_a_fresh_frame) {
-    hear(0);
+    receive(0);
     now_us += MS(300);
     iw_wheel_excuse(&wheel, now_us);
-    hear(0);
+    receive(0);
     now_us += MS(300);
     iw_wheel_excuse(&wheel, now_us);
     TEST_ASSERT_FALSE(iw_wheel_lost(&wheel, now_us));
 }
 
 TEST(test_wheel_at_standstill_counts_an_unbroken_run) {
-    hear(0);
+    receive(0);
     const iw_time_us_t start_us = now_us;
     hear_for(MS(200), 0);
     TEST_ASSERT_TRUE(rests(now_us, 0));
@@ -149,10 +149,10 @@ TEST(test_wheel_at_standstill_counts_an_unbroken_run) {
     TEST_ASSERT_FALSE(rests(start_us + MS(200) - 1U, 200000));
     TEST_ASSERT_FALSE(rests(start_us + MS(200), 500000));
     now_us += MS(4);
-    hear(3);
+    receive(3);
     TEST_ASSERT_FALSE(rests(now_us, 0));
     now_us += MS(4);
-    hear(0);
+    receive(0);
     TEST_ASSERT_FALSE(rests(now_us, 1));
     TEST_ASSERT_TRUE(rests(now_us + 1U, 1));
 }
@@ -165,46 +165,46 @@ TEST(test_wheel_at_standstill_has_its_limit_in_both_directions) {
                  {-3, false}, {32767, false}, {-32768, false}, {-32767, false}};
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         begin();
-        hear(cases[i].rpm);
+        receive(cases[i].rpm);
         TEST_ASSERT_EQUAL_INT(cases[i].rest, rests(now_us, 0));
     }
     config.rest_rpm = 0;
     begin();
-    hear(1);
+    receive(1);
     TEST_ASSERT_FALSE(rests(now_us, 0));
 }
 
 TEST(test_wheel_standstill_is_broken_by_a_gap) {
-    hear(0);
+    receive(0);
     hear_for(MS(400), 0);
     now_us += SILENT_US - 4000U;
-    hear(0);
+    receive(0);
     TEST_ASSERT_TRUE(rests(now_us, 400000));
     now_us += SILENT_US;
     TEST_ASSERT_FALSE(rests(now_us, 0));
-    hear(0);
+    receive(0);
     TEST_ASSERT_TRUE(rests(now_us, 0));
     TEST_ASSERT_FALSE(rests(now_us, 1));
 }
 
 TEST(test_wheel_standstill_cannot_begin_at_a_frame_of_unknown_age) {
     hear_as(0, false);
-    hear(5);
+    receive(5);
     hear_as(0, false);
     TEST_ASSERT_FALSE(rests(now_us, 0));
-    hear(0);
+    receive(0);
     TEST_ASSERT_TRUE(rests(now_us, 0));
     hear_as(30, false);
     TEST_ASSERT_FALSE(rests(now_us, 0));
 }
 
 TEST(test_wheel_offline_for_a_second_has_rebooted) {
-    hear(0);
+    receive(0);
     now_us += MS(1000) - 1U;
-    hear(0);
+    receive(0);
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
     now_us += MS(1000);
-    hear(0);
+    receive(0);
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_SILENCE, iw_wheel_take_reboot(&wheel));
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
     TEST_ASSERT_EQUAL_UINT32(1, wheel.reboots);
@@ -212,33 +212,33 @@ TEST(test_wheel_offline_for_a_second_has_rebooted) {
 }
 
 TEST(test_wheel_that_sends_any_frame_has_not_rebooted) {
-    hear(0);
+    receive(0);
     for (uint32_t n = 0; n < 30; n++) {
         now_us += MS(40);
         hear_status(0);
     }
-    hear(0);
+    receive(0);
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
 }
 
 TEST(test_wheel_silence_of_our_own_stall_is_no_reboot) {
-    hear(0);
+    receive(0);
     now_us += MS(5000);
     iw_wheel_excuse(&wheel, now_us);
     hear_as(0, false);
     now_us += MS(4);
-    hear(0);
+    receive(0);
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
 }
 
 TEST(test_wheel_first_frame_is_no_reboot_but_may_set_boot_seen) {
     now_us += MS(1000) - 1U;
-    hear(0);
+    receive(0);
     TEST_ASSERT_FALSE(wheel.boot_seen);
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
     begin();
     now_us += MS(1000);
-    hear(0);
+    receive(0);
     TEST_ASSERT_TRUE(wheel.boot_seen);
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
     TEST_ASSERT_EQUAL_UINT32(0, wheel.reboots);
@@ -254,14 +254,14 @@ static void hear_offsets(uint32_t number, iw_time_us_t period_us) {
 }
 
 TEST(test_wheel_endless_offset_frames_are_no_reboot) {
-    hear(0);
+    receive(0);
     hear_for(IW_WHEEL_OFFSET_LEARN_US, 0);
     hear_offsets(200, IW_WHEEL_OFFSET_PERIOD_US);
     TEST_ASSERT_EQUAL_UINT32(0, wheel.reboots);
 }
 
 TEST(test_wheel_four_lost_offset_frames_are_no_reboot) {
-    hear(0);
+    receive(0);
     hear_offsets(30, 5U * IW_WHEEL_OFFSET_PERIOD_US - 1U);
     TEST_ASSERT_EQUAL_UINT32(0, wheel.reboots);
 }
@@ -271,7 +271,7 @@ TEST(test_wheel_found_during_its_offset_frames_has_not_rebooted) {
     for (size_t i = 0; i < 3; i++) {
         begin();
         now_us += MS(10);
-        hear(0);
+        receive(0);
         hear_offsets(60U - ages_s[i], IW_WHEEL_OFFSET_PERIOD_US);
         hear_for(MS(120000), 0);
         TEST_ASSERT_EQUAL_UINT32(0, wheel.reboots);
@@ -284,7 +284,7 @@ TEST(test_wheel_offset_frames_that_return_are_a_reboot) {
     for (size_t i = 0; i < 5; i++) {
         for (iw_time_us_t early_us = 0; early_us < 2; early_us++) {
             begin();
-            hear(0);
+            receive(0);
             hear_offsets(heard_s[i], IW_WHEEL_OFFSET_PERIOD_US);
             hear_for(IW_WHEEL_OFFSET_BACK_US - early_us, 0);
             hear_other(IW_CODEC_OFFSET);
@@ -296,12 +296,12 @@ TEST(test_wheel_offset_frames_that_return_are_a_reboot) {
 }
 
 TEST(test_wheel_found_old_has_rebooted_at_an_offset_frame) {
-    hear(0);
+    receive(0);
     hear_for(IW_WHEEL_OFFSET_BACK_US - 1U, 0);
     hear_other(IW_CODEC_OFFSET); // At this time the wheel may just have started.
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
     begin();
-    hear(0);
+    receive(0);
     hear_for(IW_WHEEL_OFFSET_BACK_US, 0);
     hear_other(IW_CODEC_OFFSET);
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_OFFSET_FRAMES, iw_wheel_take_reboot(&wheel));
@@ -310,10 +310,10 @@ TEST(test_wheel_found_old_has_rebooted_at_an_offset_frame) {
 
 /// Silence or odometry reveals a reboot within the first minute of the wheel, which its offset frames do not reveal.
 TEST(test_wheel_reboot_within_a_minute_shows_by_silence_or_ticks) {
-    hear(0);
+    receive(0);
     hear_offsets(20, IW_WHEEL_OFFSET_PERIOD_US);
     now_us += IW_WHEEL_REBOOT_SILENCE_US;
-    hear(0);
+    receive(0);
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_SILENCE, iw_wheel_take_reboot(&wheel));
     hear_for(IW_WHEEL_OFFSET_LEARN_US + IW_WHEEL_OFFSET_PERIOD_US, 0);
     hear_offsets(20, IW_WHEEL_OFFSET_PERIOD_US);
@@ -328,7 +328,7 @@ TEST(test_wheel_reboot_within_a_minute_shows_by_silence_or_ticks) {
 
 /// Only the offset frames reveal a restart during a stall of the gateway: silence is excused then.
 TEST(test_wheel_offset_frames_after_our_own_stall_are_a_reboot) {
-    hear(0);
+    receive(0);
     hear_offsets(3, IW_WHEEL_OFFSET_PERIOD_US);
     now_us += IW_WHEEL_OFFSET_BACK_US;
     iw_wheel_excuse(&wheel, now_us);
@@ -346,11 +346,11 @@ TEST(test_wheel_late_frames_of_other_kinds_are_no_reboot) {
 }
 
 TEST(test_wheel_power_cut_with_restarted_odometry_is_one_reboot) {
-    hear(0);
+    receive(0);
     hear_status(1000000);
     now_us += MS(10000);
     hear_status(0);
-    hear(0);
+    receive(0);
     now_us += MS(40);
     hear_status(1);
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_SILENCE, iw_wheel_take_reboot(&wheel));

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Builds the Debian packages of these sources and of the version before, which are the commit in this repository's history that gave it its number.
+"""Builds the Debian packages of these sources and of the previous version. Its sources are the commit in this repository that introduced its number.
 
-usage: test/upgrade/packages.py      into build/upgrade, where they are kept; those of test/debian/run, if they are of these sources
+usage: test/upgrade/packages.py      into build/upgrade, where they stay; uses the packages of test/debian/run if they are of these sources
 """
 
 import fcntl
@@ -19,7 +19,7 @@ WANTED = ("iwheel-gateway_", "iwheel-tools_", "libiwheel-client0_", "libiwheel-d
 
 
 class Missing(Exception):
-    """Why no upgrade can be tested here."""
+    """The reason why no upgrade can be tested here."""
 
 
 def git(*arguments):
@@ -30,26 +30,26 @@ def git(*arguments):
 def version_before():
     versions = re.findall(r"^iwheel-gateway \(([^)]+)\)", (ROOT / "debian/changelog").read_text(), re.MULTILINE)
     if len(versions) < 2:
-        raise Missing("debian/changelog tells of one version only")
+        raise Missing("debian/changelog has only one version")
     return versions[1]
 
 
 def release_of(version):
-    """The commit that gave the sources this version, by debian/changelog."""
+    """The commit in which debian/changelog first has this version at its head."""
     for commit in git("log", "--reverse", "--format=%H", "--", "debian/changelog").split():
         if git("show", f"{commit}:debian/changelog").startswith(f"iwheel-gateway ({version})"):
             return commit
-    raise Missing(f"the history here does not reach back to {version}: a full clone has it (git fetch --unshallow)")
+    raise Missing(f"this history does not contain {version}; a full clone contains it (git fetch --unshallow)")
 
 
 def build(folder, fill):
-    """Packages of the sources that `fill` puts into a folder, in `folder`, where they may be already."""
+    """Builds, unless it is done already, the packages of the sources that `fill` writes into a folder. Returns their paths."""
     if not (folder / "built").exists():
         shutil.rmtree(folder, ignore_errors=True)
         (folder / "iwheel").mkdir(parents=True)
         fill(folder / "iwheel")
         environment = {name: value for name, value in os.environ.items() if name != "CMAKE_C_COMPILER_LAUNCHER"}
-        # What is installed has no debug information.
+        # Installed packages have no debug information.
         environment.update(
             LC_ALL="C.UTF-8",
             DEB_CFLAGS_STRIP="-g",
@@ -76,10 +76,10 @@ def packages_of_commit(commit):
 
 
 def packages_of_these_sources():
-    kept = ROOT / "build/debian"
+    built = ROOT / "build/debian"
     fingerprint = subprocess.run([ROOT / "scripts/fingerprint"], capture_output=True, text=True, check=False).stdout.strip()
-    if (kept / "built").exists() and (kept / "built").read_text().split()[:1] == [fingerprint]:
-        return [str(path) for path in sorted(kept.glob("first/*.deb")) if path.name.startswith(WANTED)]
+    if (built / "built").exists() and (built / "built").read_text().split()[:1] == [fingerprint]:
+        return [str(path) for path in sorted(built.glob("first/*.deb")) if path.name.startswith(WANTED)]
     files = [
         name for name in git("ls-files", "-z", "-co", "--exclude-standard").split("\0") if name and (ROOT / name).is_file() and not (ROOT / name).is_symlink()
     ]
@@ -95,13 +95,13 @@ def packages_of_these_sources():
 
 
 def of_both():
-    """(files of the version before, of these sources)"""
+    """(packages of the previous version, packages of these sources)"""
     for tool in ("dh", "dpkg-buildpackage"):
         if not shutil.which(tool):
             raise Missing(f"{tool} is missing (scripts/install_tools check brings it)")
     commit = release_of(version_before())
     OUT.mkdir(parents=True, exist_ok=True)
-    with open(OUT / "lock", "w", encoding="utf-8") as lock:  # The one that builds them may be still at it.
+    with open(OUT / "lock", "w", encoding="utf-8") as lock:  # Another process may still build them.
         fcntl.flock(lock, fcntl.LOCK_EX)
         return packages_of_commit(commit), packages_of_these_sources()
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""From the version before to this one and back, by the Debian packages of both (packages.py), while somebody drives.
+"""Upgrades from the previous version to this one, and downgrades, with the Debian packages of both (packages.py), while a client drives.
 
-In a copy of this system that is thrown away (an overlay in a mount namespace of its own: nothing here changes; needs root), with a service manager that
-only stops and starts. Each sentence counts as a test.
+The test runs in a disposable copy of this system (an overlay in its own mount namespace: this system does not change; needs root), with a service manager
+that only stops and starts. Each sentence counts as a test.
 """
 
 import contextlib
@@ -25,7 +25,7 @@ from packages import WANTED, Missing, of_both
 
 CLONE_NEWNS = 0x00020000
 CONF = "etc/iwheel/gateway.conf"
-# The answer to dpkg's question about a configuration that both sides have changed; its default, when nobody answers.
+# The answer to dpkg's question about a configuration that both sides have changed; it is the default without an answer.
 KEEP = ("--force-confdef", "--force-confold")
 EDITED = """; Edited by the administrator.
 [bus]
@@ -42,7 +42,7 @@ lease_ms = 300
 echo_ms = 200
 wheel_silent_ms = 200
 """
-# What the maintainer scripts call. It stops as systemd would, with SIGTERM, and starts as the unit says; nothing else.
+# The systemctl that the maintainer scripts call. It stops as systemd does, with SIGTERM, and starts as the unit requires; it does nothing else.
 MANAGER = """#!/usr/bin/python3
 import os, signal, subprocess, sys, time
 with open("/run/wheels/asked", "a") as log: log.write(" ".join(sys.argv[1:]) + "\\n")
@@ -71,11 +71,11 @@ DRIVER = """import iwheel
 with iwheel.Gateway("/run/iwheel/gateway.sock", wait=10) as gateway:
     gateway.arm("walker").drive_for(60, 300, 300)
 """
-EVIDENCE, JUDGED = verdict.Evidence(), []  # Of this attempt, which is a process of its own.
+EVIDENCE, JUDGED = verdict.Evidence(), []  # Findings of this attempt, which is a separate process.
 
 
 def judge(sentence, good, detail="", rule=False):
-    """`rule`: a safety rule, which holds however late the machine is."""
+    """`rule`: a safety rule, which holds no matter how late the machine is."""
     JUDGED.append(sentence)
     if not good:
         EVIDENCE.failures.append(verdict.Failure(f"{sentence}: {detail}", verdict.RULE if rule else verdict.kind_of(str(detail))))
@@ -101,7 +101,7 @@ class Machine:
         for name in ("run/wheels", "run/systemd/system", "tmp/packages"):
             (self.root / name).mkdir(parents=True)
         (self.root / "usr/sbin/policy-rc.d").unlink(missing_ok=True)
-        (self.root / "var/lib/man-db/auto-update").unlink(missing_ok=True)  # An index of all manual pages, each time.
+        (self.root / "var/lib/man-db/auto-update").unlink(missing_ok=True)  # dpkg would index all manual pages each time.
         systemctl = self.root / "usr/bin/systemctl"
         systemctl.unlink(missing_ok=True)
         systemctl.write_text(MANAGER)
@@ -110,7 +110,7 @@ class Machine:
         self.run("dpkg", "--purge", *(name.rstrip("_") for name in WANTED), "libiwheel-client-dev")
 
     def run(self, *command):
-        """(status, everything it said)"""
+        """(status, its whole output)"""
         done = subprocess.run(self.inside(command), stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=600, env=self.environment(), check=False)
         return done.returncode, done.stdout + done.stderr
 
@@ -142,8 +142,8 @@ class Machine:
         """The gateway's snapshot, once it fulfils the condition; the last one, or {}, after that time."""
         deadline, status = time.monotonic() + seconds, {}
         while time.monotonic() < deadline:
-            code, said = self.run("iwheelctl", "--json", "status")
-            status = json.loads(said.splitlines()[-1]) if code == 0 else {}
+            code, output = self.run("iwheelctl", "--json", "status")
+            status = json.loads(output.splitlines()[-1]) if code == 0 else {}
             if status and condition(status):
                 break
             time.sleep(0.05)
@@ -202,23 +202,23 @@ def item(status, name):
     return {key: entry.get(key) for key in ("state", "value")}
 
 
-# ---- what must be true ---------------------------------------------------------------------------------------------
+# ---- the checks ----------------------------------------------------------------------------------------------------
 
 
 def drive(machine, bus):
-    """Somebody drives, until something ends it."""
+    """Starts a client that drives until something ends it."""
     machine.ready()
     driver = machine.start("python3", "/tmp/driver.py")
     deadline = time.monotonic() + 60
     while not any(speed == 300 for _, _, speed in bus.setpoints(now_us() - 100_000)):
         if time.monotonic() > deadline:
-            raise RuntimeError("nobody drives: " + (machine.root / "run/wheels/out").read_text()[-500:])
+            raise RuntimeError("no client drives: " + (machine.root / "run/wheels/out").read_text()[-500:])
         time.sleep(0.02)
     return driver
 
 
 def stops_for_good(packages):
-    """True of 0.1.0's packages: debhelper stops the service before an upgrade, and nobody starts it afterwards."""
+    """True for the packages of 0.1.0: debhelper stops the service before an upgrade and does not start it afterwards."""
     gateway = next(package for package in packages if "iwheel-gateway_" in package)
     return "deb-systemd-invoke stop" in subprocess.run(["dpkg-deb", "--info", gateway, "preinst"], capture_output=True, text=True, check=False).stdout
 
@@ -226,28 +226,28 @@ def stops_for_good(packages):
 def change_in_motion(machine, bus, packages, version, way):
     driver = drive(machine, bus)
     begun_us = now_us()
-    code, said = machine.install(packages, *KEEP)
+    code, output = machine.install(packages, *KEEP)
     installed_us = now_us()
-    judge(f"{way} while somebody drives: the packages are installed", code == 0, said[-800:])
-    judge(f"{way}: the client is told that it drives no more", driver.wait(60) != 0, "it ended well")
+    judge(f"{way} while a client drives: the packages are installed", code == 0, output[-800:])
+    judge(f"{way}: the client learns that it no longer drives", driver.wait(60) != 0, "it ended well")
     if stops_for_good(packages):
-        judge(f"{way}: that version stops what ran, and leaves it so: its own fault, told in docs/user/deploy.md", not machine.alive())
+        judge(f"{way}: that version stops the running gateway and does not restart it: its own fault, documented in docs/user/deploy.md", not machine.alive())
         machine.run("systemctl", "start", "iwheel-gateway.service")
     status = machine.ready()
     judge(
-        f"{way}: what ran is restarted, and it is the other version",
+        f"{way}: the running gateway is restarted with the other version",
         status.get("version") == version and status["state"] == "listening",
-        (status.get("version"), said[-800:]),
+        (status.get("version"), output[-800:]),
     )
     nonzero = [t_us for t_us, _, speed in bus.setpoints(begun_us) if speed != 0]
     zeros = [t_us for t_us, _, speed in bus.setpoints(nonzero[-1]) if speed == 0] if nonzero else []
     judge(
-        f"{way}: the wheels are told to stand until they do, for more than a second",
+        f"{way}: the wheels get zeros until they are at standstill, for more than a second",
         zeros and zeros[-1] - nonzero[-1] > 1_000_000,
         f"{len(nonzero)} setpoints, then {len(zeros)} zeros",
     )
     judge(
-        f"{way}: and nothing after it",
+        f"{way}: no motion follows",
         not [t for t, _, speed in bus.setpoints(nonzero[-1] + 1) if speed != 0] and not bus.setpoints(installed_us + 2_500_000),
         rule=True,
     )
@@ -255,32 +255,32 @@ def change_in_motion(machine, bus, packages, version, way):
 
 
 def killed_in_motion(machine, bus, packages, way):
-    """A gateway that dies while it drives, and the packages are changed before it is started again."""
+    """A gateway dies while it drives, and the packages are changed before it is started again."""
     driver = drive(machine, bus)
     os.kill(machine.pid(), signal.SIGKILL)
     driver.wait(60)
-    code, said = machine.install(packages, *KEEP)
+    code, output = machine.install(packages, *KEEP)
     begun_us = now_us()
     machine.run("systemctl", "start", "iwheel-gateway.service")
     machine.ready()
     speeds = [speed for _, _, speed in bus.setpoints(begun_us)]
-    judge(f"{way} after a crash in motion: the other version sends nothing but zeros", not any(speeds), set(speeds), rule=True)
+    judge(f"{way} after a crash in motion: the other version sends only zeros", not any(speeds), set(speeds), rule=True)
     judge(
-        f"{way} after a crash in motion: it begins with them",
+        f"{way} after a crash in motion: it begins with zeros",
         code == 0 and len(speeds) > 50,
-        f"{len(speeds)} setpoints, {set(speeds)}; {said[-300:] if code else ''}",
+        f"{len(speeds)} setpoints, {set(speeds)}; {output[-300:] if code else ''}",
     )
 
 
-def kept(machine, way, before):
+def check_preserved(machine, way, before):
     status = machine.ready()
-    judge(f"{way}: the edited configuration is as it was", (machine.root / CONF).read_text() == EDITED)
-    judge(f"{way}: user and group are the same, and it is still in every group", before["owner"] <= owner(machine), owner(machine))
-    judge(f"{way}: the socket is of the same owner, group and mode", socket_rights(machine) == before["socket"], socket_rights(machine))
+    judge(f"{way}: the edited configuration is unchanged", (machine.root / CONF).read_text() == EDITED)
+    judge(f"{way}: user and group are the same, and the user is still in every group", before["owner"] <= owner(machine), owner(machine))
+    judge(f"{way}: the socket has the same owner, group and mode", socket_rights(machine) == before["socket"], socket_rights(machine))
     now = recordings(machine)
     judge(f"{way}: every recording is there, byte for byte", before["recordings"].items() <= now.items() and before["recordings"], sorted(now))
     judge(
-        f"{way}: what was learnt is taken over",
+        f"{way}: learned values are preserved",
         status.get("memory", {}).get("state") == "kept" and item(status, "setpoint_type") == before["item"],
         (status.get("memory"), item(status, "setpoint_type")),
     )
@@ -294,32 +294,32 @@ def facts(machine):
 
 
 def live_some(machine):
-    """A confirmed assumption, and a stop that is recorded."""
+    """Confirms an assumption and makes a stop that is recorded."""
     machine.ready()
-    code, said = machine.run("iwheelctl", "confirm", "setpoint_type", "1")
-    judge("before: an assumption is confirmed", code == 0, said)
+    code, output = machine.run("iwheelctl", "confirm", "setpoint_type", "1")
+    judge("before: an assumption is confirmed", code == 0, output)
     machine.run("iwheelctl", "drive", "200", "200", "--for", "500ms")
     machine.run("iwheelctl", "estop")
     deadline = time.monotonic() + 15
     while len(recordings(machine)) < 3 and time.monotonic() < deadline:
         time.sleep(0.1)
     machine.status(lambda s: s["left"]["at_rest"] and s["right"]["at_rest"])
-    time.sleep(3)  # The recording ends two seconds after its stop, and wheels at rest let the latch go.
+    time.sleep(3)  # The recording ends two seconds after its stop, and wheels at standstill permit the reset.
     machine.run("iwheelctl", "reset")
     status = machine.ready()
     judge(
-        "before: a stop is recorded, and the ledger is on disk",
+        "before: a stop is recorded, and the assumption store is on disk",
         len(recordings(machine)) >= 3 and status.get("memory", {}).get("state") in ("new", "kept"),
         (sorted(recordings(machine)), status.get("memory")),
     )
 
 
 def talk_across(machine, tool, words):
-    """The tool of the other version, beside the gateway that runs."""
-    code, said = machine.run(tool, "--json", "status")
-    judge(f"{words}: it shows the state", code == 0 and json.loads(said.splitlines()[-1])["state"] == "listening", said[-300:])
-    code, said = machine.run(tool, "drive", "100", "100", "--for", "500ms")
-    judge(f"{words}: it drives and stops", code == 0, said[-300:])
+    """Uses the tool of the other version with the running gateway."""
+    code, output = machine.run(tool, "--json", "status")
+    judge(f"{words}: it shows the state", code == 0 and json.loads(output.splitlines()[-1])["state"] == "listening", output[-300:])
+    code, output = machine.run(tool, "drive", "100", "100", "--for", "500ms")
+    judge(f"{words}: it drives and stops", code == 0, output[-300:])
 
 
 def keep_tool(machine, packages, name):
@@ -341,33 +341,33 @@ def other_default(packages, folder):
 
 
 def refused_now(machine, old, new):
-    """A configuration that the version before accepts and this one does not."""
+    """A configuration that the previous version accepts and this one refuses."""
     machine.install(old, *KEEP)
     (machine.root / CONF).write_text(EDITED + "rest_rpm = 20\nfollow_mm_s = 5000\n")
     machine.run("systemctl", "stop", "iwheel-gateway.service")
     machine.run("systemctl", "start", "iwheel-gateway.service")
     before = machine.ready().get("state")
-    code, said = machine.install(new, *KEEP)
+    code, output = machine.install(new, *KEEP)
     words = ("warning: this version refuses /etc/iwheel/gateway.conf", "follow_mm_s = 5000", "write 50..500 mm/s", "systemctl restart iwheel-gateway.service")
     judge(
         "a configuration that is refused now: the upgrade warns, and names key and range",
-        before == "listening" and code == 0 and all(word in said for word in words),
-        (before, code, said[-1500:]),
+        before == "listening" and code == 0 and all(word in output for word in words),
+        (before, code, output[-1500:]),
     )
-    judge("a configuration that is refused now: nothing is sent with it", not machine.alive(), said[-500:])
+    judge("a configuration that is refused now: nothing is sent with it", not machine.alive(), output[-500:])
     (machine.root / CONF).write_text(EDITED)
     machine.run("systemctl", "start", "iwheel-gateway.service")
-    code, said = machine.install(new, *KEEP)
-    judge("a configuration that is accepted: the upgrade does not warn", code == 0 and "warning: " not in said, said[-500:])
+    code, output = machine.install(new, *KEEP)
+    judge("a configuration that is accepted: the upgrade does not warn", code == 0 and "warning: " not in output, output[-500:])
     machine.install(old, *KEEP)
 
 
 def track_is_missing(machine, old, new):
-    """A configuration of the version before, which had a default for the distance of the wheels: nothing moves by a guess."""
+    """A configuration of the previous version, which had a default for the track: nothing moves with a guessed track."""
     (machine.root / CONF).write_text(EDITED.replace("track_mm = 540\n", ""))
     machine.run("systemctl", "start", "iwheel-gateway.service")
     before = machine.ready().get("state")
-    code, said = machine.install(new, *KEEP)
+    code, output = machine.install(new, *KEEP)
     words = (
         "warning: /etc/iwheel/gateway.conf: track_mm not configured",
         "arm will be refused",
@@ -375,16 +375,16 @@ def track_is_missing(machine, old, new):
         "systemctl restart iwheel-gateway.service",
     )
     judge(
-        "a configuration without a track: the upgrade warns, and says what mends it",
-        before == "listening" and code == 0 and all(word in said for word in words),
-        (before, code, said[-1500:]),
+        "a configuration without a track: the upgrade warns and names the fix",
+        before == "listening" and code == 0 and all(word in output for word in words),
+        (before, code, output[-1500:]),
     )
-    judge("a configuration without a track: the gateway starts and listens", machine.ready().get("state") == "listening", said[-500:])
-    code, said = machine.run("iwheelctl", "drive", "100", "100", "--for", "1s")
+    judge("a configuration without a track: the gateway starts and listens", machine.ready().get("state") == "listening", output[-500:])
+    code, output = machine.run("iwheelctl", "drive", "100", "100", "--for", "1s")
     judge(
-        "a configuration without a track: arm is refused with the key and what measures it",
-        code != 0 and "track_mm" in said and "iwheelctl bringup" in said,
-        (code, said[-500:]),
+        "a configuration without a track: arm is refused with the key and the command that measures it",
+        code != 0 and "track_mm" in output and "iwheelctl bringup" in output,
+        (code, output[-500:]),
     )
     (machine.root / CONF).write_text(EDITED)
     machine.install(old, *KEEP)
@@ -394,25 +394,21 @@ def conffiles(machine, old, new):
     machine.run("systemctl", "stop", "iwheel-gateway.service")
     packages = [name.rstrip("_") for name in WANTED]
     machine.run("dpkg", "--purge", *packages)
-    judge("purged: the configuration is gone, the recordings are not", not (machine.root / CONF).exists() and recordings(machine))
+    judge("purged: the configuration is removed, the recordings stay", not (machine.root / CONF).exists() and recordings(machine))
     changed = other_default(new, machine.folder / "changed")
     machine.install(old)
-    judge("a new installation is not running: it is configured first", not machine.alive())
-    code, said = machine.run("iwheel-gateway", "--print-config", "-c", "/etc/iwheel/gateway.conf")
-    judge("the default configuration of the version before is understood", code == 0, said[-300:])
-    code, said = machine.install([changed], "--force-depends")
-    judge(
-        "a configuration that nobody edited is replaced without a question",
-        code == 0 and "A line that is new." in (machine.root / CONF).read_text(),
-        said[-300:],
-    )
+    judge("a new installation does not start: it must be configured first", not machine.alive())
+    code, output = machine.run("iwheel-gateway", "--print-config", "-c", "/etc/iwheel/gateway.conf")
+    judge("the default configuration of the previous version is accepted", code == 0, output[-300:])
+    code, output = machine.install([changed], "--force-depends")
+    judge("an unedited configuration is replaced without a question", code == 0 and "A line that is new." in (machine.root / CONF).read_text(), output[-300:])
     machine.install(old, "--force-downgrade")
     (machine.root / CONF).write_text(EDITED)
-    code, said = machine.install([changed], *KEEP)
+    code, output = machine.install([changed], *KEEP)
     judge(
-        "an edited one is kept, the new one lies beside it",
+        "an edited configuration stays, and the new one is stored next to it",
         code == 0 and (machine.root / CONF).read_text() == EDITED and (machine.root / f"{CONF}.dpkg-dist").exists(),
-        said[-300:],
+        output[-300:],
     )
 
 
@@ -426,7 +422,7 @@ def machine():
     if os.geteuid() != 0:
         pytest.skip("only root can install packages, even in a copy of this system")
     if not any(line.split()[4] == "/" for line in Path("/proc/self/mountinfo").read_text().splitlines()):
-        pytest.skip("the root folder is no mount point, as in a plain chroot, so its mounts cannot be kept apart; bind it first: mount --bind DIR DIR")
+        pytest.skip("the root folder is no mount point, as in a plain chroot, so its mounts cannot be separated; bind it first: mount --bind DIR DIR")
     for tool in ("systemd-sysusers", "setpriv"):
         if not shutil.which(tool):
             pytest.skip(f"{tool} is missing (scripts/install_tools check brings it)")
@@ -444,8 +440,8 @@ def test_upgrade(evidence, machine, record_property):
     except Missing as why:
         pytest.skip(str(why))
     versions = [re.search(r"iwheel-gateway_([^_]+)_", " ".join(files))[1] for files in (old, new)]
-    code, said = machine.install(old)
-    judge(f"{versions[0]} is installed", code == 0, said[-800:])
+    code, output = machine.install(old)
+    judge(f"{versions[0]} is installed", code == 0, output[-800:])
     (machine.root / CONF).write_text(EDITED)
     machine.start("iwheel-sim", "--quiet", "--can", "unix:/run/wheels/bus", "--estop", "/run/wheels/button", "--control", "/run/wheels/control")
     while not (machine.root / "run/wheels/button").exists():
@@ -458,18 +454,18 @@ def test_upgrade(evidence, machine, record_property):
     old_tool, new_tool = keep_tool(machine, old, "old"), keep_tool(machine, new, "new")
     talk_across(machine, new_tool, f"iwheelctl {versions[1]} with the gateway {versions[0]}")
     change_in_motion(machine, bus, new, versions[1], "upgrade")
-    kept(machine, "upgrade", before)
+    check_preserved(machine, "upgrade", before)
     replays = [machine.run("iwheelctl", "replay", f"/var/lib/iwheel/{name}") for name in before["recordings"] if name.endswith(".log")]
     same = bool(replays) and all(code == 0 for code, _ in replays)
     judge(
         "upgrade: the new version replays the old recordings, with the same decisions",
         same,
-        (sorted(before["recordings"]), [said[-500:] for _, said in replays]),
+        (sorted(before["recordings"]), [output[-500:] for _, output in replays]),
     )
     talk_across(machine, old_tool, f"iwheelctl {versions[0]} with the gateway {versions[1]}")
     before = facts(machine)
     change_in_motion(machine, bus, old, versions[0], "downgrade")
-    kept(machine, "downgrade", before)
+    check_preserved(machine, "downgrade", before)
     killed_in_motion(machine, bus, new, "upgrade")
     killed_in_motion(machine, bus, old, "downgrade")
     refused_now(machine, old, new)

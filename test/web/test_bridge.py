@@ -58,7 +58,7 @@ def gateway_state(rig):
 # ---- who is let in --------------------------------------------------------------------------------------------------
 
 
-def test_token_missing_or_wrong_nothing_is_told_and_nothing_stopped(rig):
+def test_token_missing_or_wrong_reveals_and_stops_nothing(rig):
     rig.start().connected()
     driver = Driver(rig)
     for token in ("", "0" * 32, rig.token[:-1], rig.token + "0", rig.token.upper() + "x"):
@@ -322,7 +322,7 @@ def assert_no_gap(rig, since_us):
 
 
 @pytest.mark.rig(settings={"web": {"max_connections": 64}})
-def test_stop_gets_through_a_flood_of_a_thousand_connections_and_the_gateway_has_no_gap(rig):
+def test_stop_during_1000_connections_arrives_without_a_gap(rig):
     rig.start().connected()
     driver, since = Driver(rig), now_us()
     flood = subprocess.Popen([sys.executable, "-c", FLOOD, str(rig.port)], preexec_fn=lambda: os.nice(5))
@@ -348,7 +348,7 @@ def test_stop_gets_through_a_flood_of_a_thousand_connections_and_the_gateway_has
     driver.end()
 
 
-def test_slow_connections_and_bombs_cost_the_gateway_no_gap_and_the_page_seconds(rig):
+def test_slow_connections_and_bombs_cost_the_gateway_no_gap(rig):
     rig.start().connected()
     driver, since = Driver(rig), now_us()
     for bomb in (
@@ -401,7 +401,7 @@ def test_watchers_leave_room_for_stop(rig):
         one.close()
 
 
-def test_64_watchers_are_one_client_of_the_gateway_and_all_hear_it(rig):
+def test_64_watchers_are_one_gateway_client_and_all_get_events(rig):
     rig.start().connected()
     driver, since = Driver(rig), now_us()
     before = gateway_state(rig)["clients"]
@@ -457,7 +457,7 @@ def test_gateway_killed_is_said_and_found_again(rig):
     assert rig.web.text().count("is gone; waiting for it") == 1
 
 
-def test_gateway_that_hangs_stop_is_told_as_not_delivered(rig):
+def test_gateway_that_hangs_stop_is_reported_not_delivered(rig):
     rig.start().connected()
     rig.gateway.signal(signal.SIGSTOP)
     status, body = rig.ask_json("POST", "/api/stop")
@@ -927,7 +927,7 @@ def certificate(rig, name):
     )
 
 
-def test_tls_needs_the_right_certificate_and_ends_without_its_key(rig):
+def test_tls_needs_a_trusted_certificate_and_its_key(rig):
     if not shutil.which("openssl"):
         raise Skip("openssl is missing")
     certificate(rig, "ours")
@@ -1006,7 +1006,7 @@ def start_lan(rig):
     return found[0], found[1]
 
 
-def test_lan_serves_by_https_with_its_own_certificate_and_never_drives(rig):
+def test_lan_serves_https_with_own_certificate_and_never_drives(rig):
     rig.start_gateway()
     _, address = start_lan(rig)
     files = {name: Path(rig.path(name)) for name in ("lan-certificate.pem", "lan-key.pem", "token")}
@@ -1228,7 +1228,7 @@ def test_words_of_the_page_are_those_of_iwheelctl(rig):
 # ---- a fleet --------------------------------------------------------------------------------------------------------
 
 
-def test_fleet_is_what_iwheel_fleet_wrote_and_nothing_else_is_read(rig):
+def test_fleet_serves_only_the_file_of_iwheel_fleet(rig):
     rig.start()
     assert rig.ask_json("GET", "/api/fleet")[0] == 404 and rig.ask_json("GET", "/health")[1]["fleet"] is False
     rig.web.signal(15)

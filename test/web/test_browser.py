@@ -173,7 +173,7 @@ def test_estop_is_asked_for_once_more_and_cancelled_by_escape(rig):
         assert "emergency" not in words and "no safety function" in words
 
 
-def test_gateway_killed_all_is_unknown_and_stop_is_loudly_not_delivered(rig):
+def test_gateway_killed_values_unknown_and_stop_not_delivered(rig):
     rig.start().connected()
     with page_of(rig, "phone") as page:
         live(page)
@@ -232,7 +232,7 @@ HIDE = "Object.defineProperty(document, 'hidden', {value: true, configurable: tr
 
 
 @pytest.mark.rig(driving=True)
-def test_pad_drives_while_it_is_held_and_stops_when_let_go_or_hidden(rig):
+def test_pad_drives_while_held_and_stops_when_released_or_hidden(rig):
     rig.start().connected()
     with page_of(rig) as page:
         live(page)
@@ -304,7 +304,7 @@ def test_pad_held_without_evidence_of_a_hand_stops_after_2_s(rig):
             time.sleep(0.6)
 
 
-def test_recording_is_opened_played_and_opened_again_from_its_files(rig):
+def test_recording_is_opened_played_and_reopened_from_files(rig):
     rig.start().connected()
     driver = Driver(rig)
     until(lambda: (rig.bus.speed_rpm(0) or 0) >= 9, what="180 mm/s are measured")
@@ -428,7 +428,7 @@ def write_fleet(rig, age_s=0.0):
     part.rename(rig.path("fleet.json"))
 
 
-def test_fleet_page_shows_each_machine_says_when_it_is_old_and_fits(rig):
+def test_fleet_page_shows_each_machine_marks_old_ones_and_fits(rig):
     axe = ASSETS / "axe-core-4.14.1/axe.min.js"
     rig.web_settings["fleet"] = {"source": rig.path("fleet.json"), "machine_page": "https://{machine}.local:8470/"}
     rig.start()
@@ -466,7 +466,7 @@ def test_fleet_page_shows_each_machine_says_when_it_is_old_and_fits(rig):
         seen(page, "location.pathname === '/fleet' && document.querySelector('#login').hidden")
 
 
-def test_page_is_accessible_and_fits_in_light_and_dark_on_phone_and_desk(rig):
+def test_page_is_accessible_and_fits_each_theme_and_screen(rig):
     axe = ASSETS / "axe-core-4.14.1/axe.min.js"
     if not axe.is_file():
         raise Skip("axe-core is missing (scripts/web_assets --test brings it)")

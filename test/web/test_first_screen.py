@@ -97,7 +97,7 @@ def test_large_figures_are_those_of_the_snapshot(rig):
 
 
 @pytest.mark.rig(driving=True)
-def test_stop_is_alive_above_each_question_zoomed_and_with_large_text(rig):
+def test_stop_is_usable_above_dialogs_zoomed_and_in_large_text(rig):
     rig.start().connected()
     for size in VIEWS:
         with page_of(rig, size, **touch(size)) as page:
@@ -192,7 +192,7 @@ def switch_on(page):
 
 
 @pytest.mark.rig(driving=True)
-def test_pad_is_seen_with_its_figures_state_and_estop_in_each_size(rig):
+def test_pad_in_each_size_is_visible_with_state_and_estop(rig):
     rig.start().connected()
     for size in VIEWS:
         with page_of(rig, size, **touch(size)) as page:
@@ -222,7 +222,7 @@ def commanded(rig):
 
 
 @pytest.mark.rig(driving=True)
-def test_pad_two_keys_are_a_curve_and_one_released_leaves_the_other(rig):
+def test_pad_with_two_keys_drives_a_curve_until_one_is_released(rig):
     rig.start().connected()
     with page_of(rig) as page:
         live(page)
@@ -318,7 +318,7 @@ def test_languages_have_the_same_texts_with_the_same_gaps(rig):
 
 
 @pytest.mark.rig(driving=True)
-def test_page_speaks_german_to_a_german_browser_and_english_when_asked(rig):
+def test_page_in_german_browser_is_german_english_on_request(rig):
     rig.start().connected()
     rig.sim.ask("estop press")
     until(lambda: rig.ask_json("GET", "/api/stops")[1]["stops"], what="the stop is known")
@@ -402,7 +402,7 @@ def test_plots_are_dragged_and_pinched_by_touch(rig):
         assert page.evaluate("visualViewport.scale") == 1
 
 
-def test_recording_has_its_cursor_at_0_and_no_live_figure_under_its_headings(rig):
+def test_recording_starts_at_0_and_shows_no_live_values(rig):
     rig.start().connected()
     driver = Driver(rig)
     until(lambda: (rig.bus.speed_rpm(0) or 0) >= 9, what="180 mm/s are measured")

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-/// Reads an event `state` by libiwheel-client, over and over: to be run by a counter of instructions.
+/// Reads an event `state` through libiwheel-client again and again, for a counter of instructions.
 ///
-///     bench_client FILE ROUNDS [fields]    FILE: the event as one line, as `bench_status line` prints it; fields: these are read, too
+///     bench_client FILE ROUNDS [fields]    FILE: the event as one line, as `bench_status line` prints it; fields: reads its fields too
 ///
-/// Two runs with different ROUNDS differ by the reading alone. Exit status 1 if the client does not read each of them.
+/// Two runs with different ROUNDS differ only in the reading. Exit status 1 if the client does not read each event.
 #include "iwheel_client/client.h"
 
 #include <stdio.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// The C source that cantools generates from share/iwheel.dbc at the time of the run, with the choice by id that its user has to write.
+/// The C source that cantools generates from share/iwheel.dbc during the run, with the selection by id that its user must write.
 #include "bench_codec.h"
 #include "iwheel.h"
 

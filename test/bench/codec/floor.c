@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-/// The leanest program that reads these frames: ids compared in the order of how often they come, values stored where they are wanted, no
-/// word about side, kind or remote frames. What a codec costs beyond this is the price of being one.
+/// The leanest program that reads these frames: ids are compared in the order of their frequency, and values are stored at their destination,
+/// without side, kind or remote frames. The cost of a codec beyond this is the price of its generality.
 #include "bench_codec.h"
 
 typedef struct {

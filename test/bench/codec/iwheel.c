@@ -2,7 +2,7 @@
 #include "bench_codec.h"
 #include "iwheel/codec.h"
 
-static iw_codec_wheel_t seen[IW_SIDES]; // The latest of each message, kept per wheel, as a program needs them.
+static iw_codec_wheel_t seen[IW_SIDES]; // The latest of each message, stored per wheel, as a program needs them.
 static iw_can_frame_t encoded;
 
 uint32_t bench_decode(uint32_t rounds) {

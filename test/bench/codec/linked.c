@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// What a linker keeps of the codec for a program that reads all messages and sends setpoints.
+/// The part of the codec that a linker retains for a program that reads all messages and sends setpoints.
 #include "iwheel/codec.h"
 
 iw_codec_kind_t bench_linked_decode(const iw_can_frame_t *frame, iw_codec_wheel_t wheel[IW_SIDES]);

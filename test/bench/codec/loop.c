@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-/// The loops of the benchmark around nothing: each frame is passed by, a setpoint's three values and its side are taken. What they count is
-/// not the codec's and is subtracted.
+/// The loops of the benchmark without a codec: each frame is skipped; a setpoint's three values and its side are read. Their count is
+/// subtracted, because it is not the codec's.
 #include "bench_codec.h"
 
 uint32_t bench_decode(uint32_t rounds) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// Preloaded into the gateway: counts allocations in a file of 8 bytes named by BENCH_ALLOCATIONS.
+/// Preloaded into the gateway: counts allocations in a file of 8 bytes that BENCH_ALLOCATIONS names.
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <fcntl.h>
@@ -10,7 +10,7 @@
 #include <unistd.h>
 
 static _Atomic uint64_t *counter;
-static pid_t owner; ///< The process that writes recordings is another one.
+static pid_t owner; ///< Another process writes recordings.
 
 __attribute__((constructor)) static void begin(void) {
     const char *path = getenv("BENCH_ALLOCATIONS");

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-/// The event `state`, as it is written for whoever watches, of a gateway that drives two wheels: to be run by a counter of instructions.
+/// The event `state` for a watcher, from a gateway that drives two wheels, for a counter of instructions.
 ///
-///     bench_status kept ROUNDS    nothing of the ledger has changed since the event before
-///     bench_status anew ROUNDS    something has, each time
-///     bench_status line           prints one event
+///     bench_status same ROUNDS       no assumption has changed since the previous event
+///     bench_status changed ROUNDS    an assumption has changed each time
+///     bench_status line              prints one event
 ///
-/// Two runs with different ROUNDS differ by the events alone. Exit status 1 if the gateway does not drive or an event is not whole.
+/// Two runs with different ROUNDS differ only in the events. Exit status 1 if the gateway does not drive or an event is incomplete.
 #include "answers/answers.h"
 #include "daemon_rig.h"
 #include "sockets/sock_clients.h"
@@ -18,7 +18,7 @@
 #include <unistd.h>
 
 static unsigned rounds;
-static bool anew;
+static bool changes;
 static bool prints;
 
 void setUp(void) {
@@ -45,7 +45,7 @@ static void bench_status(void) {
     daemon_rig_drive(client, 300, 300, 500);
     iw_assumption_entry_t *const entry = &daemon->wheels.core.assumptions.entry[IW_ASSUMPTION_GEAR_RATIO];
     for (unsigned i = 0; i < rounds; i++) {
-        entry->figure += anew ? 1 : 0;
+        entry->figure += changes ? 1 : 0;
         TEST_ASSERT_GREATER_THAN_size_t(0, write_event(daemon, &line));
     }
     if (prints) {
@@ -58,7 +58,7 @@ static void bench_status(void) {
 
 int main(int argc, char **argv) {
     rounds = (argc > 2) ? (unsigned)strtoul(argv[2], NULL, 10) : 0U;
-    anew = argc > 1 && strcmp(argv[1], "anew") == 0;
+    changes = argc > 1 && strcmp(argv[1], "changed") == 0;
     prints = argc > 1 && strcmp(argv[1], "line") == 0;
     UNITY_BEGIN();
     RUN_TEST(bench_status);

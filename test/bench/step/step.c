@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// A gateway that drives two obedient wheels, to be run by a counter of instructions: `bench_prepare` brings it to a steady drive, then
+/// A gateway that drives two obedient wheels, for a counter of instructions: `bench_prepare` brings it to a steady drive, then
 /// `bench_idle` is one step with nothing due, `bench_pair` one in which a pair is due (of a ramp after `bench_faster`), `bench_frame_in` one that receives a speed; `bench_look` takes a snapshot.
 #include "iwheel/gateway.h"
 
@@ -49,13 +49,13 @@ static int nothing(void *context) {
 }
 
 static void wheel_speaks(iw_side_t side) {
-    const iw_codec_wheel_t told = {.speed = {.speed_rpm = rpm}};
+    const iw_codec_wheel_t message = {.speed = {.speed_rpm = rpm}};
     iw_can_frame_t *const frame = &bus.frame[(bus.first + bus.count) % QUEUE];
-    (void)iw_codec_encode(IW_CODEC_SPEED, side, &told, frame);
+    (void)iw_codec_encode(IW_CODEC_SPEED, side, &message, frame);
     bus.count++;
 }
 
-/// One millisecond: every fourth brings both speeds, and the client drives every fiftieth.
+/// Runs one millisecond: every fourth brings both speeds, and the client drives in every fiftieth.
 static void run_ms(uint32_t ms, int32_t speed_mm_s) {
     const iw_drive_t drive = {{speed_mm_s, speed_mm_s}, {0, 0}, false};
     iw_applied_t applied;
@@ -72,7 +72,7 @@ static void run_ms(uint32_t ms, int32_t speed_mm_s) {
     }
 }
 
-/// True once the wheels are driven steadily and nothing is due.
+/// Returns true if the wheels are driven steadily and nothing is due.
 int bench_prepare(void) {
     const iw_hal_t hal = {
         .send = bus_send, .receive = bus_receive, .bus_state = bus_state, .purge = nothing, .estop_pressed = nothing};
@@ -97,7 +97,7 @@ int bench_prepare(void) {
     return iw_gateway_state(&gateway) == IW_STATE_ARMED && bus.count == 0U;
 }
 
-/// 1 if a pair was sent.
+/// Returns 1 if a pair was sent.
 int bench_idle(void) {
     const uint32_t sent = bus.sent;
     (void)iw_gateway_step(&gateway, now_us + 1U);
@@ -110,7 +110,7 @@ int bench_pair(void) {
     return bus.sent != sent;
 }
 
-/// The client wants another speed: the next pair is one of a ramp. 1 if it may.
+/// The client commands another speed, so the next pair belongs to a ramp. Returns 1 if the gateway accepts it.
 int bench_faster(void) {
     const iw_drive_t drive = {{300, 280}, {0, 0}, false};
     iw_applied_t applied;
@@ -128,12 +128,12 @@ int bench_frame_in(void) {
 
 static iw_snapshot_t seen;
 
-/// Everything that may be known, looked at once.
+/// Reads one snapshot.
 void bench_look(void) {
     iw_gateway_snapshot(&gateway, gateway.promised_us, &seen);
 }
 
-/// 1 if it has seen what there is.
+/// Returns 1 if the snapshot has the expected state.
 int bench_seen(void) {
     return seen.state == IW_STATE_ARMED && seen.wheel[IW_LEFT].heard && seen.wheel[IW_RIGHT].heard;
 }

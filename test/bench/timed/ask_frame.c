@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// Sends a frame, over and over, and prints how long it took until a line came of it, in nanoseconds: from standard input, or from a socket.
+/// Sends a frame again and again, and prints the time in nanoseconds until a line follows: from standard input, or from a socket.
 /// usage: ask_frame INTERFACE COUNT [SOCKET FIRST_LINE]
 #include "timed.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// Sends one of two lines after the other, each in the pause after a pair, and prints how long it took until a frame followed, in nanoseconds.
+/// Sends two lines alternately, each in the pause after a pair, and prints the time in nanoseconds until a frame follows.
 /// usage: ask_line INTERFACE SOCKET COUNT LINE_A LINE_B [FIRST_LINE]   FIRST_LINE: to be answered with ok before the others
 #include "timed.h"
 
@@ -11,21 +11,21 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-/// Later than the shortest spacing of pairs, well before the next one of a period is due.
+/// Later than the shortest spacing of pairs, and well before the next pair of a period is due.
 #define PAUSE_NS   8000000
 #define PERIOD_ms  19
 #define LINE_BYTES 512
 #define REPLY_ms   3000
-/// Between two tries to arm.
+/// Time between two attempts to arm.
 #define REST_ms 100
 
-static void say(int client, const char *words) {
+static void send_line(int client, const char *words) {
     char line[LINE_BYTES];
     const int length = snprintf(line, sizeof line, "%s\n", words);
     (void)timed_need((int)send(client, line, (size_t)length, MSG_NOSIGNAL), "send");
 }
 
-/// False: the wheels still turn after an earlier measurement.
+/// Returns false if the wheels still turn after an earlier measurement.
 static bool hear_ok(int client) {
     static char answer[65536];
     size_t length = 0;
@@ -46,16 +46,16 @@ static bool hear_ok(int client) {
     return true;
 }
 
-/// Says it until the wheels are at rest, for REPLY_ms at the most.
+/// Repeats the line until the wheels are at standstill, for at most REPLY_ms.
 static void ask_until_ok(int client, const char *words) {
     for (int waited_ms = 0; waited_ms < REPLY_ms; waited_ms += REST_ms) {
-        say(client, words);
+        send_line(client, words);
         if (hear_ok(client)) {
             return;
         }
         timed_sleep_until_ns(timed_now_ns(CLOCK_MONOTONIC) + REST_ms * INT64_C(1000000));
     }
-    timed_fail("the wheels did not come to rest");
+    timed_fail("the wheels did not come to standstill");
 }
 
 static void forget(int can, int client) {
@@ -67,7 +67,7 @@ static void forget(int can, int client) {
     }
 }
 
-/// After the next pair, or a period without one, and a pause.
+/// Waits for the next pair, or for a period without one, and then for a pause.
 static void wait_for_pause(int can, int client) {
     struct can_frame frame;
     int64_t at_ns;
@@ -88,7 +88,7 @@ int main(int argc, char **argv) {
         int64_t at_ns;
         wait_for_pause(can, client);
         const int64_t asked_ns = timed_now_ns(CLOCK_REALTIME);
-        say(client, argv[4 + i % 2]);
+        send_line(client, argv[4 + i % 2]);
         if (!timed_receive(can, TIMED_LEFT, &frame, &at_ns, REPLY_ms)) {
             timed_fail("no frame followed");
         }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// Starts a program that sends a frame, over and over, and prints how long it took until the frame was there, in nanoseconds.
+/// Starts a program that sends a frame, again and again, and prints the time in nanoseconds until the frame is on the bus.
 /// usage: ask_program INTERFACE COUNT PROGRAM [ARGUMENT...]
 #include "timed.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// A peer: the kernel's broadcast manager sends both setpoints by itself. usage: bcm_period INTERFACE PERIOD_US
+/// A peer: the kernel's broadcast manager sends both setpoints on its own. usage: bcm_period INTERFACE PERIOD_US
 #include "timed.h"
 
 #include <linux/can/bcm.h>

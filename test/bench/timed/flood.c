@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-/// Sends the frames of a nominal bus, faster: so many a second, evenly in bursts of a millisecond. What it was too late to send is never
-/// sent, as no bus brings more than fits into the time. Prints how many it sent.
+/// Sends the frames of a nominal bus at this rate, evenly in bursts of a millisecond. Frames that are late are dropped,
+/// because no bus carries more than fits into the time. Prints the number of sent frames.
 /// usage: flood INTERFACE FRAMES_PER_S SECONDS
 #define _GNU_SOURCE
 #include "timed.h"

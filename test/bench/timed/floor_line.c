@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// The floor of a command: reads a line of two numbers from the one client there is and writes both setpoints.
+/// The floor of a command: reads a line of two numbers from its only client and writes both setpoints.
 /// usage: floor_line INTERFACE SOCKET
 #include "timed.h"
 

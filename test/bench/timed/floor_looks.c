@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-/// The floor of who looks before anything leaves, as the gateway must: waits for all of them at once, reads the clock, what has come, the
-/// bus, edges and level of the e-stop, then acts. A command of two numbers becomes both setpoints, a frame a line.
+/// The floor of a program that reads everything before it sends, as the gateway must: waits for all sources together, reads the clock, received data, the
+/// bus, edges and level of the e-stop, then acts. A command of two numbers becomes both setpoints, a frame becomes a line.
 /// usage: floor_looks INTERFACE CHIP OFFSET [SOCKET]   without a socket: lines of frames on standard output
 #include "timed.h"
 
@@ -15,7 +15,7 @@
 
 #define PERIOD_ms 20
 
-/// 1 while it is not pressed; edges are read where they may have come since the wait.
+/// Returns 1 while the e-stop is not pressed; reads edges if the wait reported any.
 static int may_act(int line, int edges) {
     struct gpio_v2_line_event event;
     struct gpio_v2_line_values values = {.mask = 1};
@@ -23,7 +23,7 @@ static int may_act(int line, int edges) {
     return size < 0 && ioctl(line, GPIO_V2_LINE_GET_VALUES_IOCTL, &values) == 0 && values.bits != 0U;
 }
 
-static void tell(const struct can_frame *frame) {
+static void write_line(const struct can_frame *frame) {
     char line[64];
     int length = snprintf(line, sizeof line, "%03X#", frame->can_id);
     for (unsigned i = 0; i < frame->len && i < sizeof frame->data; i++) {
@@ -44,15 +44,15 @@ static void serve(int can, int line, int client) {
     struct can_frame frame;
     (void)timed_now_ns(CLOCK_MONOTONIC);
     const ssize_t length = (client >= 0) ? recv(client, words, sizeof words - 1U, MSG_DONTWAIT) : -1;
-    const int heard = recv(can, &frame, sizeof frame, MSG_DONTWAIT) == (ssize_t)sizeof frame;
+    const int received = recv(can, &frame, sizeof frame, MSG_DONTWAIT) == (ssize_t)sizeof frame;
     if (length == 0 || !may_act(line, length > 0)) {
         exit(0);
     }
     if (length > 0) {
         words[length] = '\0';
         command(can, words);
-    } else if (heard && client < 0) {
-        tell(&frame);
+    } else if (received && client < 0) {
+        write_line(&frame);
     }
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// The floor of a setpoint's period: an absolute timer, two frames, nothing else. usage: floor_period INTERFACE PERIOD_US
+/// The floor of a setpoint's period: an absolute timer and two frames. usage: floor_period INTERFACE PERIOD_US
 #include "timed.h"
 
 #include <stdlib.h>

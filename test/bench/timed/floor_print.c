@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// The floor of telling a frame: reads it, writes it as a line to standard output. usage: floor_print INTERFACE
+/// The floor of reporting a frame: reads it and writes it as a line to standard output. usage: floor_print INTERFACE
 #include "timed.h"
 
 #include <stdio.h>

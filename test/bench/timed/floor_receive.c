@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// The floor of receiving: batches from one socket, decoded into one structure. Tells how many frames that were when it is ended.
+/// The floor of receiving: batches from one socket, decoded into one structure. Prints the number of frames when it is ended.
 /// usage: floor_receive INTERFACE
 #define _GNU_SOURCE
 #include "timed.h"
@@ -22,8 +22,8 @@ static void end(int number) {
     ended = 1;
 }
 
-/// Into the place where the codec's floor reads it.
-static void take(const struct can_frame *frame, uint32_t at) {
+/// Copies the frame to where the codec's floor reads it.
+static void decode(const struct can_frame *frame, uint32_t at) {
     bench_frame[at] = (iw_can_frame_t){.id = frame->can_id, .dlc = frame->len};
     memcpy(bench_frame[at].data, frame->data, sizeof frame->data);
 }
@@ -44,7 +44,7 @@ int main(int argc, char **argv) {
     while (ended == 0) {
         const int count = recvmmsg(can, message, BATCH, MSG_WAITFORONE, NULL);
         for (int i = 0; i < count; i++) {
-            take(&frame[i], at);
+            decode(&frame[i], at);
             at = (at + 1U < BENCH_FRAMES) ? at + 1U : 0U;
             (void)((at == 0U) ? bench_decode(1) : 0U);
         }

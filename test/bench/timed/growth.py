@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What more clients cost: watchers at 50 Hz and one who floods, over the local bus: gaps between setpoints, and the gateway's processor time."""
+"""The cost of more clients: watchers at 50 Hz and a flooding client, over the local bus: gaps between setpoints, and the gateway's processor time."""
 
 import contextlib
 import itertools
@@ -35,7 +35,7 @@ def connect(path):
 
 
 def watch(path, count, rate_hz, topics):
-    """In a process of its own: reads whatever comes."""
+    """A separate process that reads all that comes."""
     selector = selectors.DefaultSelector()
     request = json.dumps({"id": 1, "cmd": "watch", "topics": topics.split(","), "rate_hz": rate_hz}) + "\n"
 
@@ -52,13 +52,13 @@ def watch(path, count, rate_hz, topics):
                 gone = not key.fileobj.recv(1 << 20)
             except ConnectionResetError:
                 gone = True
-            if gone:  # Too slow for the gateway: it comes back, as watchers do.
+            if gone:  # The gateway closed the slow client, which connects again as watchers do.
                 selector.unregister(key.fileobj)
                 begin()
 
 
 def flood(path):
-    """In a process of its own: asks as fast as it can and hardly ever reads."""
+    """A separate process that sends requests as fast as it can and hardly ever reads."""
     while True:
         with contextlib.suppress(ConnectionError):
             flood_until_sent_away(connect(path))
@@ -85,13 +85,13 @@ def cpu_ns(pid):
 
 
 def be_ordinary():
-    """Whatever priority the benchmark has: a crowd has none."""
+    """The crowd has no priority, whatever priority the benchmark has."""
     os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
 
 
 class Crowd:
-    def __init__(self, path, watchers, hostile, wish=STATE):
-        words = [["watch", str(path), str(watchers), *map(str, wish)]] if watchers else []
+    def __init__(self, path, watchers, hostile, wanted=STATE):
+        words = [["watch", str(path), str(watchers), *map(str, wanted)]] if watchers else []
         words += [["flood", str(path)]] if hostile else []
         self.children = [subprocess.Popen([sys.executable, __file__, *each], preexec_fn=be_ordinary) for each in words]
 
@@ -102,7 +102,7 @@ class Crowd:
 
 
 def arm(client):
-    """Holds the lease, whatever a late machine did to it before."""
+    """Gets the lease, whatever state a late machine has caused."""
     for _ in range(200):
         if client.ask(cmd="arm", name="bench")["ok"]:
             client.ask(cmd="drive", left_mm_s=100, right_mm_s=100)
@@ -113,9 +113,9 @@ def arm(client):
     raise RuntimeError("the gateway cannot be armed")
 
 
-def one(pair, client, watchers, hostile, seconds, wish=STATE):
+def one(pair, client, watchers, hostile, seconds, wanted=STATE):
     """Gap p99 in microseconds, and the gateway's share of a processor."""
-    crowd = Crowd(pair.northbound, watchers, hostile, wish)
+    crowd = Crowd(pair.northbound, watchers, hostile, wanted)
     time.sleep(0.7)
     arm(client)
     bus = Bus(str(pair.folder / "bus"))
@@ -132,24 +132,24 @@ def one(pair, client, watchers, hostile, seconds, wish=STATE):
 
 def measure(pair, client_type, rounds=3, seconds=6.0):
     """{(watchers, hostile): [figures of each round]}, in turns."""
-    taken = {}
+    measured = {}
     client = client_type(pair.northbound)
     for _ in range(rounds):
         for watchers, hostile in [*((count, False) for count in WATCHERS), (0, True), (16, True)]:
-            taken.setdefault((watchers, hostile), []).append(one(pair, client, watchers, hostile, seconds))
-        taken.setdefault((MANY, False), []).append(one(pair, client, MANY, False, seconds, EVERYTHING))
+            measured.setdefault((watchers, hostile), []).append(one(pair, client, watchers, hostile, seconds))
+        measured.setdefault((MANY, False), []).append(one(pair, client, MANY, False, seconds, EVERYTHING))
     client.close()
-    return taken
+    return measured
 
 
-def rows(taken):
+def rows(measured):
     """(metric, figure, goal)"""
 
     def middle(who, key):
-        return statistics.median(figures[key] for figures in taken[who])
+        return statistics.median(figures[key] for figures in measured[who])
 
     alone_us, idle = middle((0, False), "gap_p99"), middle((0, False), "cpu")
-    for watchers, hostile in taken:
+    for watchers, hostile in measured:
         gap_us = middle((watchers, hostile), "gap_p99") - alone_us
         share = middle((watchers, hostile), "cpu") - idle
         if hostile:

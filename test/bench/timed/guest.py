@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Inside the kernel: everything of one plan, candidate after candidate, round after round, and what came of it, as lines of JSON.
+"""Inside the kernel: runs one plan, candidate after candidate, round after round, and prints the results as lines of JSON.
 
 Usage: guest.py PLAN.json    {"measures": [NAME...], "rounds": N, "build": DIR, "tools": DIR, "peers": DIR, "results": FILE, ...}
 """
@@ -31,7 +31,7 @@ def available(candidate, plan):
 
 
 def one_turn(around, measure, candidate):
-    """The figures, and how late somebody who sleeps a millisecond was woken meanwhile. Only a turn in which the machine stalled is repeated."""
+    """The figures, and the longest delay of a program that sleeps a millisecond. Only a turn in which the machine stalled is repeated."""
     stall_us = around.plan.get("stall_us", STALL_US)
     for tries in range(1, TRIES + 1):
         sleeper, figures, failed = around.tool("sleeper", piped=True), None, None
@@ -49,22 +49,22 @@ def one_turn(around, measure, candidate):
     return None
 
 
-def play_round(around, measure, candidates, tell):
+def play_round(around, measure, candidates, report):
     for candidate in candidates:
         try:
-            tell(candidate=candidate, figures=one_turn(around, measure, candidate))
+            report(candidate=candidate, figures=one_turn(around, measure, candidate))
         except Exception as error:  # noqa: BLE001
-            tell(candidate=candidate, failed=f"{type(error).__name__}: {error}", where=traceback.format_exc()[-1500:])
+            report(candidate=candidate, failed=f"{type(error).__name__}: {error}", where=traceback.format_exc()[-1500:])
 
 
-def play(plan, tell):
+def play(plan, report):
     around = Surroundings(plan)
     for name in plan["measures"]:
         measure = MEASURES[name](around)
         candidates = [c for c in measure.candidates if c in plan.get("candidates", measure.candidates) and available(c, plan)]
         measure.begin()
         for number in range(plan["rounds"]):
-            play_round(around, measure, candidates, lambda name=name, number=number, **what: tell(measure=name, round=number, **what))
+            play_round(around, measure, candidates, lambda name=name, number=number, **what: report(measure=name, round=number, **what))
         measure.end()
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The timed benchmark from outside: builds its programs, gets the peers, boots the kernel, and makes rows of what comes back."""
+"""The timed benchmark from outside: builds its programs, installs the peers, boots the kernel, and makes rows of the results."""
 
 import os
 import statistics
@@ -23,7 +23,7 @@ ALL = ("calls", "period_idle", "period_loaded", "flood", "flood_loaded", "line",
 COUNTED = ("calls",)  # in virtual time: each frame comes at its own moment, however long it takes to trace the calls
 FULL = {"rounds": 3, "period_s": 4.0, "flood_s": 3.0, "calls_s": 3.0, "count": 150, "presses": 12}
 SHORT = {"rounds": 1, "period_s": 0.6, "flood_s": 0.3, "calls_s": 0.5, "count": 10, "presses": 1, "stall_us": 1_000_000}
-# Of the smoke test: wrong by orders of magnitude, whatever else the machine does.
+# Limits of the smoke test: a figure beyond is wrong by orders of magnitude, whatever else the machine does.
 ABSURD = {"ppm": 20_000, "lost": 3_000, "per_frame": 20, "p50": 100_000}
 LIMIT_S = 1800
 SMOKE_LIMIT_S = 120
@@ -41,7 +41,7 @@ def have(program):
 
 
 def get_packages():
-    """Debian's packages of peers that are missing, if this is root on Debian. What cannot be had is left out, loudly."""
+    """Installs the missing Debian packages of peers, if this is root on Debian. Packages that are unavailable are left out with a message."""
     missing = sorted({package for program, package in PACKAGES.items() if not have(program)})
     if missing and os.geteuid() == 0 and have("apt-get"):
         print(f"installing: apt-get install -y --no-install-recommends {' '.join(missing)}")
@@ -57,7 +57,7 @@ def get_packages():
 
 
 def get_python_can(folder):
-    """Path of python-can in a folder of its own, from PyPI; empty if it cannot be had."""
+    """Path of python-can in a separate folder, from PyPI; empty if it is unavailable."""
     pip = [sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--target", str(folder), "python-can>=4,<5"]
     if subprocess.run(pip, check=False).returncode == 0:
         return str(folder)
@@ -66,15 +66,15 @@ def get_python_can(folder):
 
 
 def be_prompt():
-    """What is timed goes before what else the machine does, as far as this process may decide that."""
+    """Raises the priority of the timed programs above other programs, as far as this process may."""
     try:
         os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(1))
     except PermissionError:
-        print("without real-time priority: other programs of this machine disturb what is timed")
+        print("without real-time priority: other programs of this machine disturb the figures")
 
 
 def boot_and_wait(kernel, folder, plan, limit_s):
-    """Results, turn by turn, as they come. On one processor: going from one to another takes longer than what is timed."""
+    """Yields the results turn by turn. All programs run on one processor: a change of the processor takes longer than the timed work."""
     name, processor = "counted" if plan["virtual"] else "timed", max(os.sched_getaffinity(0))
     boot = Boot(kernel, str(folder), name, {"group": "timed", **plan}, {processor})
     try:
@@ -89,33 +89,33 @@ def boot_and_wait(kernel, folder, plan, limit_s):
 
 
 def play(kernel, folder, plan, limit_s):
-    """Results of all measures of the plan, each in the time that is meant for it."""
+    """Results of all measures of the plan, each in its kind of time."""
     for virtual in (False, True):
         names = [name for name in plan["measures"] if (name in COUNTED) is virtual]
         if names:
             yield from boot_and_wait(kernel, folder, {**plan, "measures": names, "virtual": virtual}, limit_s)
 
 
-def measure(build, wish, measures=ALL, candidates=None, limit_s=LIMIT_S, show=print):
-    """{measure: {candidate: [figures of each round]}}, and what failed. RuntimeError if there is no kernel."""
+def measure(build, request, measures=ALL, candidates=None, limit_s=LIMIT_S, show=print):
+    """{measure: {candidate: [figures of each round]}}, and the failures. RuntimeError if there is no kernel."""
     kernel = find_kernel()
     if candidates is None:
         get_packages()
     be_prompt()
-    taken, failures = {}, []
+    measured, failures = {}, []
     with tempfile.TemporaryDirectory(prefix="iwheel-timed-") as name:
         folder = Path(name)
         build_tools(folder)
         peers = get_python_can(folder / "peers") if candidates is None else ""
-        plan = {**wish, "guest": str(HERE / "guest.py"), "build": str(Path(build).resolve()), "tools": name, "peers": peers, "measures": list(measures)}
+        plan = {**request, "guest": str(HERE / "guest.py"), "build": str(Path(build).resolve()), "tools": name, "peers": peers, "measures": list(measures)}
         plan |= {"candidates": list(candidates)} if candidates else {}
         for result in play(kernel, folder, plan, limit_s):
             show(result)
             if "failed" in result:
                 failures.append(f"{result['measure']}, {result['candidate']}: {result['failed']}")
             else:
-                taken.setdefault(result["measure"], {}).setdefault(result["candidate"], []).append(result["figures"])
-    return taken, failures
+                measured.setdefault(result["measure"], {}).setdefault(result["candidate"], []).append(result["figures"])
+    return measured, failures
 
 
 # ---- rows ---------------------------------------------------------------------------------------------------------
@@ -130,9 +130,9 @@ NAMES = {
 }
 
 
-def whole(taken, name):
-    """Both the floor's figures and the gateway's are there."""
-    return {"gateway", "floor"} <= set(taken.get(name, {})) or (name == "calls" and "gateway" in taken.get(name, {}))
+def whole(measured, name):
+    """True if the figures of the floor and of the gateway exist."""
+    return {"gateway", "floor"} <= set(measured.get(name, {})) or (name == "calls" and "gateway" in measured.get(name, {}))
 
 
 def middle(rounds, key):
@@ -140,7 +140,7 @@ def middle(rounds, key):
 
 
 def ratio(of, candidate, key):
-    """Of the same round, so that a slow minute hits both."""
+    """Ratios within the same round, so a slow minute affects both."""
     return statistics.median(mine[key] / max(floor[key], 0.001) for mine, floor in zip(of[candidate], of["floor"], strict=True))
 
 
@@ -160,10 +160,10 @@ def row(what, floor, mine, peers, goal):
     return [what, floor, mine, peers, goal]
 
 
-def period_rows(taken):
+def period_rows(measured):
     for name, words in (("period_idle", "a quiet bus"), ("period_loaded", "617 frames/s of telemetry")):
-        if whole(taken, name):
-            of = taken[name]
+        if whole(measured, name):
+            of = measured[name]
             yield row(
                 f"setpoint period, deviation p50, {words}",
                 us(middle(of["floor"], "p50")),
@@ -180,10 +180,10 @@ def period_rows(taken):
             )
 
 
-def flood_rows(taken):
-    if not whole(taken, "flood"):
+def flood_rows(measured):
+    if not whole(measured, "flood"):
         return
-    of = taken["flood"]
+    of = measured["flood"]
     lost = {c: sum(figures["lost"] for figures in of[c]) / sum(figures["sent"] for figures in of[c]) for c in of}
     yield row("21 000 frames/s: lost", f"{lost['floor']:.1%}", f"{lost['gateway']:.1%}", peers_of(of, lambda c: f"{lost[c]:.1%}"), "0")
     yield row(
@@ -195,9 +195,9 @@ def flood_rows(taken):
     )
 
 
-def loaded_flood_rows(taken):
-    if whole(taken, "flood_loaded"):
-        of = taken["flood_loaded"]
+def loaded_flood_rows(measured):
+    if whole(measured, "flood_loaded"):
+        of = measured["flood_loaded"]
         lost = {c: sum(figures["lost"] for figures in of[c]) / sum(figures["sent"] for figures in of[c]) for c in of}
         yield row(
             "21 000 frames/s beside four programs that compute: lost",
@@ -208,9 +208,9 @@ def loaded_flood_rows(taken):
         )
 
 
-def call_rows(taken):
-    if whole(taken, "calls"):
-        of = dict(taken["calls"])
+def call_rows(measured):
+    if whole(measured, "calls"):
+        of = dict(measured["calls"])
         if "driving" in of:
             yield row(
                 "617 frames/s: system calls for a frame, driving",
@@ -228,15 +228,15 @@ def call_rows(taken):
         )
 
 
-def latency_rows(taken):
+def latency_rows(measured):
     wanted = (
         ("line", "client's line to frame on the bus", (("p50", "≤ 2.0 ×"), ("p90", "≤ 1.4 ×"))),
         ("told", "frame on the bus to client's line", (("p50", "≤ 1.3 ×"),)),
         ("estop", "press of the e-stop to both zeros", (("p50", "≤ 1.3 ×"), ("p90", "≤ 1.8 ×"))),
     )
     for name, words, parts in wanted:
-        for key, goal in parts if whole(taken, name) else ():
-            of = taken[name]
+        for key, goal in parts if whole(measured, name) else ():
+            of = measured[name]
             yield row(
                 f"{words}, {key}",
                 us(middle(of["floor"], key)),
@@ -246,16 +246,16 @@ def latency_rows(taken):
             )
 
 
-def rows(taken):
-    return [*call_rows(taken), *period_rows(taken), *flood_rows(taken), *loaded_flood_rows(taken), *latency_rows(taken)]
+def rows(measured):
+    return [*call_rows(measured), *period_rows(measured), *flood_rows(measured), *loaded_flood_rows(measured), *latency_rows(measured)]
 
 
 def pair_table(build, before, rounds, pair_s):
     """Lines about the gap between both setpoints of a pair, of the program `before` and of this build in turns."""
-    wish = {"rounds": rounds, "pair_s": pair_s, "before": str(Path(before).resolve()), "stall_us": 1_000_000}
-    taken, failures = measure(build, wish, ("pair",), ("before", "gateway"), show=lambda result: print(".", end="", flush=True))
+    request = {"rounds": rounds, "pair_s": pair_s, "before": str(Path(before).resolve()), "stall_us": 1_000_000}
+    measured, failures = measure(build, request, ("pair",), ("before", "gateway"), show=lambda result: print(".", end="", flush=True))
     lines = ["", *failures, "| | pairs | p50 | p99 | p99.9 | largest | later than 1 ms | left alone |", "|---|---:|---:|---:|---:|---:|---:|---:|"]
-    for name, turns in taken.get("pair", {}).items():
+    for name, turns in measured.get("pair", {}).items():
         gaps = [gap for turn in turns for gap in turn["gaps_ns"]]
         whole_us = sorted(gap / 1000 for gap in gaps if gap >= 0)
         at = [us(whole_us[min(len(whole_us) - 1, int(len(whole_us) * part))]) for part in (0.5, 0.99, 0.999, 1.0)]
@@ -265,13 +265,13 @@ def pair_table(build, before, rounds, pair_s):
 
 
 def smoke(build):
-    """What is wrong with the short turns of floor and gateway; empty: nothing."""
+    """The faults of the short turns of floor and gateway; empty: none."""
     wanted = [name for name in ALL if name != "calls" or have("strace")]
     if len(wanted) < len(ALL):
         print("left out: calls (strace is not installed)")
-    taken, faults = measure(build, SHORT, wanted, ("floor", "gateway"), SMOKE_LIMIT_S, show=lambda result: None)
-    faults += [f"{name}: no figures" for name in wanted if "gateway" not in taken.get(name, {}) and not any(f.startswith(name) for f in faults)]
-    for name, of in taken.items():
+    measured, faults = measure(build, SHORT, wanted, ("floor", "gateway"), SMOKE_LIMIT_S, show=lambda result: None)
+    faults += [f"{name}: no figures" for name in wanted if "gateway" not in measured.get(name, {}) and not any(f.startswith(name) for f in faults)]
+    for name, of in measured.items():
         for figures in of.get("gateway", []):
             faults += [f"{name}: {figures}" for key, limit in ABSURD.items() if abs(figures.get(key, 0)) > limit]
     return faults

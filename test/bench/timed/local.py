@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Floor and gateway in turns on the machine's own kernel, over the local bus: the same small programs as on vcan, real system calls."""
+"""Floor and gateway in turns on the machine's own kernel, over the local bus: the same small programs as on vcan, with real system calls."""
 
 import itertools
 import statistics
@@ -26,7 +26,7 @@ def wait_for(path, within_s=10.0):
 
 
 class Local:
-    """`pair` is the benchmark's gateway and simulator; the floor runs on a bus of its own, beside wheels of its own."""
+    """`pair` is the benchmark's gateway and simulator; the floor runs on a separate bus with separate wheels."""
 
     def __init__(self, pair, tools):
         self.pair, self.tools = pair, Path(tools)
@@ -55,12 +55,12 @@ class Local:
         done = subprocess.run([self.tools / name, *map(str, arguments)], stdout=subprocess.PIPE, text=True, check=True, timeout=120)
         return [int(line) / 1000 for line in done.stdout.split()]
 
-    def beside(self, name, *arguments):
+    def start_next(self, name, *arguments):
         return subprocess.Popen([self.tools / name, *map(str, arguments)])
 
     def line_floor(self):
         path = Path(f"{self.pair.folder}/line.{time.monotonic_ns()}")
-        floor = self.beside("floor_line", self.bus, path)
+        floor = self.start_next("floor_line", self.bus, path)
         wait_for(path)
         try:
             return self.run("ask_line", self.bus, path, COUNT, "50 50", "60 60")
@@ -76,7 +76,7 @@ class Local:
         return [abs(b - a - PERIOD_US) for a, b in itertools.pairwise(at)]
 
     def period_floor(self):
-        floor = self.beside("floor_period", self.bus, PERIOD_US)
+        floor = self.start_next("floor_period", self.bus, PERIOD_US)
         try:
             return self.off_period(self.bus)
         finally:
@@ -103,7 +103,7 @@ class Local:
 
 
 def settle(client):
-    """Until the gateway can be armed again."""
+    """Waits until the gateway can be armed again."""
     client.ask(cmd="stop")
     for _ in range(200):
         time.sleep(0.05)
@@ -118,22 +118,22 @@ def figures(values):
     return {"p50": percentile(values, 50), "p90": percentile(values, 90)}
 
 
-def one_round(local, client, taken):
+def one_round(local, client, measured):
     settle(client)
-    taken["period"]["floor"].append(figures(local.period_floor()))
-    taken["period"]["gateway"].append(figures(local.period_gateway(client)))
+    measured["period"]["floor"].append(figures(local.period_floor()))
+    measured["period"]["gateway"].append(figures(local.period_gateway(client)))
     settle(client)
-    taken["line"]["floor"].append(figures(local.line_floor()))
-    taken["line"]["gateway"].append(figures(local.line_gateway()))
+    measured["line"]["floor"].append(figures(local.line_floor()))
+    measured["line"]["gateway"].append(figures(local.line_gateway()))
 
 
 def measure(pair, client_type, tools, rounds=ROUNDS):
-    """{metric: {"floor" or "gateway": [figures of each round]}}. A round in which the gateway stopped, for want of time, does not count."""
-    local, taken = Local(pair, tools), {"line": {"floor": [], "gateway": []}, "period": {"floor": [], "gateway": []}}
+    """{metric: {"floor" or "gateway": [figures of each round]}}. A round in which the gateway stopped because it was late does not count."""
+    local, measured = Local(pair, tools), {"line": {"floor": [], "gateway": []}, "period": {"floor": [], "gateway": []}}
     client = client_type(pair.northbound)
     try:
         for _ in range(rounds):
-            one = {name: {"floor": [], "gateway": []} for name in taken}
+            one = {name: {"floor": [], "gateway": []} for name in measured}
             try:
                 one_round(local, client, one)
             except subprocess.CalledProcessError as error:
@@ -141,21 +141,21 @@ def measure(pair, client_type, tools, rounds=ROUNDS):
                 continue
             for name, of in one.items():
                 for who, values in of.items():
-                    taken[name][who] += values
+                    measured[name][who] += values
     finally:
         client.close()
         local.end()
-    return taken
+    return measured
 
 
-def rows(taken):
+def rows(measured):
     """(metric, figure, goal): medians of the rounds' ratios to the floor."""
     for name, key, words, goal in (
         ("period", "p50", "setpoint period, deviation p50", "≤ 1.4 ×"),
         ("line", "p50", "client's line to frame on the bus, p50", "≤ 1.2 ×"),
         ("line", "p90", "client's line to frame on the bus, p90", "≤ 1.4 ×"),
     ):
-        of = taken[name]
+        of = measured[name]
         if of["floor"]:
             ratio = statistics.median(mine[key] / max(floor[key], 0.5) for mine, floor in zip(of["gateway"], of["floor"], strict=True))
             floor_us = statistics.median(figures[key] for figures in of["floor"])

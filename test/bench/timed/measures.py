@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Inside the kernel: what is measured. Each measure has candidates, and each candidate is one turn: it returns figures."""
+"""Inside the kernel: the measures. Each measure has candidates, and each candidate is one turn: it returns figures."""
 
 import contextlib
 import itertools
@@ -27,7 +27,7 @@ def numbers(text):
 
 
 class Renewal(threading.Thread):
-    """Keeps the lease with the same command, so that nothing but the period sends setpoints."""
+    """Renews the lease with the same command, so only the period causes setpoints."""
 
     def __init__(self, client):
         super().__init__(daemon=True)
@@ -44,7 +44,7 @@ class Renewal(threading.Thread):
 
 
 class Insistence(Renewal):
-    """The same, and armed again after each stop: on a machine with other work the loop is late at times."""
+    """The same, and armed again after each stop: on a machine with other load the loop is late at times."""
 
     def run(self):
         while not self.quit.wait(0.1):
@@ -57,7 +57,7 @@ class Insistence(Renewal):
 
 @contextlib.contextmanager
 def driven(around, program=None, served=True, renewal=Renewal):
-    """A gateway of its own, which a client drives as long."""
+    """A separate gateway that a client drives meanwhile."""
     around.start_gateway(program, served)
     client = around.client()
     around.arm(client)
@@ -72,17 +72,17 @@ def driven(around, program=None, served=True, renewal=Renewal):
         around.end_gateway()
 
 
-# Computes for some milliseconds, then sleeps: a guest that computes all the time is itself held up by the machine.
+# Computes for some milliseconds, then sleeps: the machine delays a guest that computes all the time.
 WORK = "while :; do i=0; while [ $i -lt 3000 ]; do i=$((i+1)); done; sleep 0.02; done"
 
 
 def as_a_hog():
-    """Hogs of the gateway's priority make the loop late, and it stops."""
+    """Hogs with the gateway's priority delay the loop, and it stops."""
     os.setpriority(os.PRIO_PROCESS, 0, 0)
 
 
 class Measure:
-    """`turn(candidate)` is called for one after the other, round after round."""
+    """Calls `turn(candidate)` for one candidate after the other, round after round."""
 
     candidates = ()
 
@@ -90,7 +90,7 @@ class Measure:
         self.around, self.plan = around, around.plan
 
     def begin(self):
-        """Before the first turn."""
+        """Called before the first turn."""
 
     def end(self):
         self.around.end_gateway()
@@ -110,7 +110,7 @@ class Period(Measure):
         self.around.start_wheels(self.slow)
 
     def judge(self, process=None):
-        """The kernel's stamps of the left setpoint, then the deviations of their distances, in microseconds."""
+        """Reads the kernel's stamps of the left setpoint; returns the deviations of their distances in microseconds."""
         stamps = numbers(self.around.tool("stamps", self.around.interface, "10A", self.plan["period_s"], piped=True).text(60))
         if process is not None:
             process.end()
@@ -140,24 +140,24 @@ class Period(Measure):
 
 
 class PeriodLoaded(Period):
-    """The same beside the telemetry of both wheels at its nominal rate."""
+    """The same next to the telemetry of both wheels at its nominal rate."""
 
     slow = 1
 
 
 def processor_ns(pid):
-    """Processor time that a process has used, by its own clock: the ticks in /proc are charged to whoever happens to run at the tick."""
+    """Processor time of a process by its own clock: the ticks in /proc are charged to the process that runs at the tick."""
     return time.clock_gettime_ns((~pid << 3) | 2)  # clock_getcpuclockid(3) of Linux
 
 
 class Flood(Measure):
-    """A full bus of shortest frames: what is lost, and what a receiver takes of the processor."""
+    """A full bus of shortest frames: lost frames, and a receiver's share of the processor."""
 
     candidates = ("floor", "gateway", "candump")
     rate = 21000
 
     def send(self, pid):
-        """What was sent, and the processor time of a receiver meanwhile."""
+        """Sent frames, and the processor time of a receiver meanwhile."""
         time.sleep(0.3)
         before = processor_ns(pid)
         sent = int(self.around.tool("flood", self.around.interface, self.rate, self.plan["flood_s"], piped=True).text(60))
@@ -195,7 +195,7 @@ class Flood(Measure):
 
 
 class FloodLoaded(Flood):
-    """The same on a machine with other work: whoever has too little room loses frames while it waits for the processor."""
+    """The same on a machine with other load: a receiver with a small buffer loses frames while it waits for the processor."""
 
     hogs = 4
 
@@ -210,13 +210,13 @@ class FloodLoaded(Flood):
 
 
 class Pair(Measure):
-    """How long the right setpoint comes after the left one, beside hogs and programs that every frame wakes: of this build, and of a program from before."""
+    """Delay of the right setpoint after the left one, next to hogs and programs that every frame wakes: for this build, and for an earlier program."""
 
     candidates = ("before", "gateway")
     hogs, receivers = 2, 4
 
     def begin(self):
-        """Pairs come every 5 ms, so that there are enough of them. What drives and the wheels have the gateway's priority: they must not stop it."""
+        """Pairs come every 5 ms, so there are enough of them. The driving client and the wheels have the gateway's priority: they must not stop it."""
         as_a_service()
         self.around.start_wheels()
         with open("gateway.conf", encoding="ascii") as file:
@@ -249,7 +249,7 @@ class Pair(Measure):
 
 
 class Calls(Measure):
-    """System calls for each frame of the wheels' telemetry; reading a clock is none where the kernel maps it."""
+    """System calls per frame of the wheels' telemetry; reading a clock is none if the kernel maps it."""
 
     candidates = ("driving", "gateway", "attended", "candump", "python_can")
 
@@ -312,7 +312,7 @@ class Calls(Measure):
 
 
 class Line(Measure):
-    """From a client's line to the frame on the bus."""
+    """Time from a client's line to the frame on the bus."""
 
     candidates = ("floor", "gateway", "looks", "python_can", "cansend")
     lines = ("50 50", "60 60")
@@ -345,7 +345,7 @@ class Line(Measure):
         return self.at_socket(lambda path: self.around.floor("line", self.around.interface, path))
 
     def looking(self, *path, **options):
-        """The leanest program that looks at bus and e-stop before it acts, as the gateway does."""
+        """The leanest program that reads bus and e-stop before it acts, as the gateway does."""
         chip = self.around.chip
         return self.around.floor("looks", self.around.interface, f"/dev/{chip.chip}", chip.OFFSET, *path, **options)
 
@@ -371,13 +371,13 @@ class Line(Measure):
             self.around.end_gateway()
 
 
-class Told(Line):
-    """From a frame on the bus to the line at a client."""
+class Reported(Line):
+    """Time from a frame on the bus to the line at a client."""
 
     candidates = ("floor", "gateway", "looks", "candump")
 
     def begin(self):
-        """No wheels: the frame that is waited for is the only one."""
+        """There are no wheels: the awaited frame is the only one."""
 
     def piped(self, process):
         time.sleep(0.2)
@@ -407,8 +407,8 @@ class Told(Line):
 
 
 class Estop(Measure):
-    """From the press to the second of both zeros. The simulated line shows the level at once and tells of the edge at the kernel's
-    next tick, right before which we press: who looks at the level may be sooner than who waits for the edge.
+    """Time from the press to the second of both zeros. The simulated line shows the level immediately and reports the edge at the kernel's
+    next tick, and the press comes just before that tick: a program that reads the level may be faster than one that waits for the edge.
     """
 
     candidates = ("floor", "gateway", "gpiomon")
@@ -432,7 +432,7 @@ class Estop(Measure):
         self.chip.pull(False)
         edge = self.witness.next(1.0)
         if edge is None:
-            raise RuntimeError("the line told of no edge")
+            raise RuntimeError("the line reported no edge")
         return edge[0]
 
     def release(self):
@@ -440,12 +440,12 @@ class Estop(Measure):
         self.chip.pull(True, self.chip.WITNESS)
 
     def press(self):
-        """Right before a tick, so that the time between level and edge is short for those who look at levels."""
+        """Waits until just before a tick, so the time between level and edge is short for programs that read levels."""
         now_us = time.monotonic_ns() // 1000
         due_us = now_us + self.TICK_US - (now_us + self.BEFORE_US - self.tick_us) % self.TICK_US
         time.sleep(max(due_us - now_us - self.SPIN_US, 0) / 1e6)
         while time.monotonic_ns() // 1000 < due_us:
-            pass  # Sleeping would end too late, and the edge be told a whole tick after the level.
+            pass  # Sleeping would end too late, and the edge would be reported a whole tick after the level.
         return time.monotonic_ns() // 1000, self.press_now()
 
     def once(self, bus, settle_s=0.0):
@@ -519,6 +519,6 @@ MEASURES = {
     "pair": Pair,
     "calls": Calls,
     "line": Line,
-    "told": Told,
+    "told": Reported,
     "estop": Estop,
 }

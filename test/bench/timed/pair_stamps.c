@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// Prints, in nanoseconds between the kernel's stamps, how long each right setpoint came after its left one; -1 where the next left one
+/// Prints, in nanoseconds between the kernel's stamps, the delay of each right setpoint after its left one; -1 where the next left one
 /// came first. usage: pair_stamps INTERFACE SECONDS
 #include "timed.h"
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Peers of the timed benchmark that python-can is made for.
+"""Peers of the timed benchmark with python-can.
 
 usage: python_can_peer.py period INTERFACE PERIOD_US | line INTERFACE SOCKET | receive INTERFACE
 """
@@ -20,7 +20,7 @@ def setpoint(can_id, mm_s):
 
 
 def period(bus, period_us):
-    """The library's own thread, as it is used where the kernel does not repeat frames."""
+    """The library's own thread, which it uses where the kernel does not repeat frames."""
     lock = threading.Lock()
     for can_id in (LEFT, RIGHT):
         ThreadBasedCyclicSendTask(bus, lock, setpoint(can_id, 100), int(period_us) / 1e6).start()

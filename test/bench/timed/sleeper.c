@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// Sleeps a millisecond over and over; when it is ended it prints how late it was woken at worst, in microseconds: then the machine stood.
+/// Sleeps a millisecond again and again; at its end it prints the longest delay in microseconds: then the machine stalled.
 #include "timed.h"
 
 #include <signal.h>

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Inside the kernel: one CAN interface, simulated wheels, an e-stop line, the gateway, and the programs that are measured beside it."""
+"""Inside the kernel: one CAN interface, simulated wheels, an e-stop line, the gateway, and the measured programs."""
 
 import grp
 import os
@@ -22,7 +22,7 @@ AWAITED = ("not_at_rest", "stale_command", "cause_present", "send_stalled", "est
 
 
 class Started:
-    """A program that is ended by its process id, and what it printed. `served`: at the priority that the gateway's service has."""
+    """A program that is ended by its process id, and its output. `served`: with the priority of the gateway's service."""
 
     def __init__(self, command, folder, standard_input=None, environment=None, piped=False, served=False):
         self.words = list(map(str, command))
@@ -37,7 +37,7 @@ class Started:
         )
 
     def text(self, within_s):
-        """All it prints until it ends by itself; the lines are whole or an exception is raised."""
+        """All its output until it ends on its own; raises if the lines are incomplete."""
         output, _ = self.child.communicate(timeout=within_s)
         if self.child.returncode != 0:
             with open(self.errors.name, encoding="utf-8", errors="replace") as file:
@@ -45,7 +45,7 @@ class Started:
         return output.decode()
 
     def end(self):
-        """Asks it to end; returns what it printed."""
+        """Sends it the signal to end; returns its output."""
         if self.child.poll() is None:
             self.child.send_signal(signal.SIGTERM)
         try:
@@ -58,13 +58,13 @@ class Started:
 
 
 class Surroundings:
-    """What all who are measured have in common."""
+    """The surroundings of all measured programs."""
 
     def __init__(self, plan):
         self.plan, self.folder = plan, os.getcwd()
         self.interface, self.gateway, self.wheels = "vcan0", None, None
         netdev.add_vcan(self.interface)
-        with open("/proc/sys/net/core/rmem_max", "w", encoding="ascii") as file:  # For all alike, as the package sets it.
+        with open("/proc/sys/net/core/rmem_max", "w", encoding="ascii") as file:  # The same for all, as the package sets it.
             file.write("4194304")
         self.chip = GpioChip("timed", "ESTOP")
         self.chip.pull(True)
@@ -144,7 +144,7 @@ class Surroundings:
                 time.sleep(0.005)
 
     def arm(self, client):
-        """As soon as the wheels are heard, at rest, and nothing is latched."""
+        """Waits until the wheels are online and at standstill, and nothing is latched."""
         for _ in range(ARM_TRIES):
             reply = client.arm()
             if reply["ok"]:

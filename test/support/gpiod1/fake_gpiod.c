@@ -8,7 +8,7 @@
 #include <string.h>
 #include <unistd.h>
 
-/// Two chips with their lines; the line is on the second. A chip's pointer is that of its first line.
+/// Two chips with their lines; the line is on the second. The pointer to a chip is the pointer to its first line.
 static char lines[2][FAKE_GPIO_LINES];
 static unsigned iterated;
 
@@ -28,7 +28,7 @@ struct gpiod_chip *gpiod_chip_open_by_name(const char *name) {
 
 void gpiod_chip_close(struct gpiod_chip *chip) {
     fake_gpio.open -= (chip != NULL) ? 1 : 0;
-    errno = EACCES; // As any call may.
+    errno = EACCES; // Any call may set errno.
 }
 
 struct gpiod_line *gpiod_chip_get_line(struct gpiod_chip *chip, unsigned offset) {
@@ -50,7 +50,7 @@ struct gpiod_chip *gpiod_chip_iter_next_noclose(struct gpiod_chip_iter *iter) {
 
 void gpiod_chip_iter_free_noclose(struct gpiod_chip_iter *iter) {
     (void)iter;
-    errno = EACCES; // As any call may.
+    errno = EACCES; // Any call may set errno.
 }
 
 unsigned gpiod_chip_num_lines(struct gpiod_chip *chip) {
@@ -65,7 +65,7 @@ const char *gpiod_line_name(struct gpiod_line *line) {
 
 struct gpiod_chip *gpiod_line_get_chip(struct gpiod_line *line) {
     if (line == NULL) {
-        abort(); // As the library crashes.
+        abort(); // The library crashes here.
     }
     const size_t at = (size_t)((char *)(void *)line - &lines[0][0]);
     return (struct gpiod_chip *)(void *)lines[at / FAKE_GPIO_LINES];
@@ -93,11 +93,11 @@ void gpiod_line_close_chip(struct gpiod_line *line) {
     }
 }
 
-static int give(struct gpiod_line *line, int flags, bool both) {
+static int request_line(struct gpiod_line *line, int flags, bool both) {
     fake_gpio.offset = (unsigned)((char *)(void *)line - &lines[1][0]);
     fake_gpio.is_input = true;
     fake_gpio.both_edges = both;
-    fake_gpio.room = 16U; // It cannot be chosen.
+    fake_gpio.room = 16U; // libgpiod 1 always uses this size.
     fake_gpio.pulled_up = (flags & GPIOD_LINE_REQUEST_FLAG_BIAS_PULL_UP) != 0;
     errno = fake_gpio.busy_error;
     if (fake_gpio.busy_error != 0 || pipe(fake_gpio.ends) != 0) {
@@ -109,12 +109,12 @@ static int give(struct gpiod_line *line, int flags, bool both) {
 
 int gpiod_line_request_both_edges_events_flags(struct gpiod_line *line, const char *consumer, int flags) {
     (void)consumer;
-    return give(line, flags, true);
+    return request_line(line, flags, true);
 }
 
 int gpiod_line_request_rising_edge_events_flags(struct gpiod_line *line, const char *consumer, int flags) {
     (void)consumer;
-    return give(line, flags, false);
+    return request_line(line, flags, false);
 }
 
 int gpiod_line_event_get_fd(struct gpiod_line *line) {

@@ -11,7 +11,7 @@
 static char one;
 static struct dirent entry;
 static unsigned listed;
-static unsigned given;
+static unsigned allocated;
 static unsigned wished_room;
 static bool shown_own;
 static unsigned shown_offset;
@@ -57,14 +57,14 @@ struct gpiod_chip *gpiod_chip_open(const char *path) {
 
 void gpiod_chip_close(struct gpiod_chip *chip) {
     fake_gpio.open -= (chip != NULL) ? 1 : 0;
-    errno = EACCES; // As any call may.
+    errno = EACCES; // Any call may set errno.
 }
 
 struct gpiod_chip_info *gpiod_chip_get_info(struct gpiod_chip *chip) {
     if (chip == NULL) {
-        abort(); // As the library does.
+        abort(); // The library crashes here.
     }
-    given++;
+    allocated++;
     return (struct gpiod_chip_info *)(void *)chip;
 }
 
@@ -82,11 +82,11 @@ const char *gpiod_chip_info_get_name(struct gpiod_chip_info *info) {
 }
 
 void gpiod_chip_info_free(struct gpiod_chip_info *info) {
-    given -= (info != NULL) ? 1U : 0U;
+    allocated -= (info != NULL) ? 1U : 0U;
 }
 
 struct gpiod_line_info *gpiod_chip_get_line_info(struct gpiod_chip *chip, unsigned offset) {
-    given++;
+    allocated++;
     shown_own = (void *)chip == (void *)&one;
     shown_offset = offset;
     return (struct gpiod_line_info *)(void *)&one;
@@ -98,8 +98,8 @@ const char *gpiod_line_info_get_name(struct gpiod_line_info *info) {
 }
 
 void gpiod_line_info_free(struct gpiod_line_info *info) {
-    shown_offset = FAKE_GPIO_LINES - 1U; // Its name is another one's now.
-    given -= (info != NULL) ? 1U : 0U;
+    shown_offset = FAKE_GPIO_LINES - 1U; // Another line has its name now.
+    allocated -= (info != NULL) ? 1U : 0U;
 }
 
 struct gpiod_line_request *gpiod_chip_request_lines(struct gpiod_chip *chip, struct gpiod_request_config *config,
@@ -117,13 +117,13 @@ struct gpiod_line_request *gpiod_chip_request_lines(struct gpiod_chip *chip, str
 }
 
 struct gpiod_line_settings *gpiod_line_settings_new(void) {
-    given++;
+    allocated++;
     return (struct gpiod_line_settings *)(void *)&one;
 }
 
 void gpiod_line_settings_free(struct gpiod_line_settings *settings) {
-    given -= (settings != NULL) ? 1U : 0U;
-    errno = EACCES; // As any call may.
+    allocated -= (settings != NULL) ? 1U : 0U;
+    errno = EACCES; // Any call may set errno.
 }
 
 int gpiod_line_settings_set_direction(struct gpiod_line_settings *settings, enum gpiod_line_direction direction) {
@@ -145,12 +145,12 @@ int gpiod_line_settings_set_bias(struct gpiod_line_settings *settings, enum gpio
 }
 
 struct gpiod_line_config *gpiod_line_config_new(void) {
-    given++;
+    allocated++;
     return (struct gpiod_line_config *)(void *)&one;
 }
 
 void gpiod_line_config_free(struct gpiod_line_config *lines) {
-    given -= (lines != NULL) ? 1U : 0U;
+    allocated -= (lines != NULL) ? 1U : 0U;
 }
 
 int gpiod_line_config_add_line_settings(struct gpiod_line_config *lines, const unsigned *offsets, size_t count,
@@ -162,13 +162,13 @@ int gpiod_line_config_add_line_settings(struct gpiod_line_config *lines, const u
 }
 
 struct gpiod_request_config *gpiod_request_config_new(void) {
-    given++;
+    allocated++;
     wished_room = 0;
     return (struct gpiod_request_config *)(void *)&one;
 }
 
 void gpiod_request_config_free(struct gpiod_request_config *config) {
-    given -= (config != NULL) ? 1U : 0U;
+    allocated -= (config != NULL) ? 1U : 0U;
 }
 
 void gpiod_request_config_set_consumer(struct gpiod_request_config *config, const char *consumer) {
@@ -205,12 +205,12 @@ enum gpiod_line_value gpiod_line_request_get_value(struct gpiod_line_request *li
 }
 
 struct gpiod_edge_event_buffer *gpiod_edge_event_buffer_new(size_t capacity) {
-    given++;
+    allocated++;
     return (capacity > 0U) ? (struct gpiod_edge_event_buffer *)(void *)&one : NULL;
 }
 
 void gpiod_edge_event_buffer_free(struct gpiod_edge_event_buffer *buffer) {
-    given -= (buffer != NULL) ? 1U : 0U;
+    allocated -= (buffer != NULL) ? 1U : 0U;
 }
 
 int gpiod_line_request_read_edge_events(struct gpiod_line_request *line, struct gpiod_edge_event_buffer *buffer,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// What the port uses of libgpiod 2, so that gpio_v2.c can be tested on any machine.
+/// The part of libgpiod 2 that the port uses, so that gpio_v2.c can be tested on any machine.
 #ifndef TEST_GPIOD_H
 #define TEST_GPIOD_H
 

@@ -9,7 +9,7 @@
 #include <unistd.h>
 
 /// Sends a line that the daemon has not read yet.
-static void say(const char *line) {
+static void send_line(const char *line) {
     TEST_ASSERT_EQUAL_INT((int)strlen(line), (int)send(client, line, strlen(line), MSG_NOSIGNAL));
 }
 
@@ -29,7 +29,7 @@ TEST(test_estop_pressed_before_wake_latches_before_next_setpoint) {
         daemon_rig_begin_driving(client);
         daemon_rig_run(phase);
         daemon_rig.most_mm_s = 0;
-        say(SLOWER);
+        send_line(SLOWER);
         daemon_rig.estop_silent = phase % 2U == 1U;
         daemon_rig.estop = (phase % 4U < 2U) ? 1 : -1;
         daemon_rig_run(1);
@@ -44,7 +44,7 @@ TEST(test_estop_pressed_before_wake_latches_before_next_setpoint) {
 TEST(test_estop_pulse_after_wake_latches_before_next_setpoint) {
     begin_driving_between_pairs();
     daemon_rig.estop_late = true;
-    say(SLOWER);
+    send_line(SLOWER);
     daemon_rig_run(1);
     TEST_ASSERT_FALSE(daemon_rig.estop_late);
     TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
@@ -54,11 +54,11 @@ TEST(test_estop_pulse_after_wake_latches_before_next_setpoint) {
 
 TEST(test_command_of_the_holder_is_sent_after_one_poll) {
     begin_driving_between_pairs();
-    const uint32_t looks = daemon_rig.looks;
+    const uint32_t polls = daemon_rig.polls;
     const uint32_t sent = daemon_rig.sent[IW_LEFT];
-    say(SLOWER);
+    send_line(SLOWER);
     daemon_rig_run(1);
-    TEST_ASSERT_EQUAL_UINT32(looks + 1U, daemon_rig.looks);
+    TEST_ASSERT_EQUAL_UINT32(polls + 1U, daemon_rig.polls);
     TEST_ASSERT_EQUAL_UINT32(sent + 1U, daemon_rig.sent[IW_LEFT]);
     TEST_ASSERT_TRUE(daemon_rig.most_mm_s < 500);
 }
@@ -97,13 +97,13 @@ static void assert_refused_behind_a_stop(void) {
 
 TEST(test_command_that_waited_during_a_stall_is_refused) {
     begin_driving_between_pairs();
-    say(SLOWER);
+    send_line(SLOWER);
     daemon_rig.stolen_us = 150000U;
     daemon_rig_run(1);
     assert_refused_behind_a_stop();
     daemon_rig_run(4000);
     begin_driving_between_pairs();
-    say(SLOWER);
+    send_line(SLOWER);
     daemon_rig.suspended_us += 150000U;
     daemon_rig_run(1);
     assert_refused_behind_a_stop();

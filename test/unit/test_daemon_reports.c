@@ -57,9 +57,9 @@ TEST(test_hello_has_the_time_of_its_cycle) {
     const ssize_t size = recv(other, text, sizeof text - 1U, MSG_DONTWAIT);
     TEST_ASSERT_GREATER_THAN_INT(0, (int)size);
     text[size] = '\0';
-    const char *told = strstr(text, "\"t_us\":");
-    TEST_ASSERT_NOT_NULL_MESSAGE(told, text);
-    TEST_ASSERT_GREATER_OR_EQUAL_UINT64(before_us, strtoull(told + strlen("\"t_us\":"), NULL, 10));
+    const char *found = strstr(text, "\"t_us\":");
+    TEST_ASSERT_NOT_NULL_MESSAGE(found, text);
+    TEST_ASSERT_GREATER_OR_EQUAL_UINT64(before_us, strtoull(found + strlen("\"t_us\":"), NULL, 10));
     (void)close(other);
 }
 
@@ -99,11 +99,11 @@ static const char *said_after(const char *line) {
 }
 
 /// Checks that an event with this name has arrived and contains `part`.
-static void assert_told(const char *said, const char *name, const char *part) {
+static void assert_told(const char *text_sent, const char *name, const char *part) {
     char begin[64];
     char line[8192];
     (void)snprintf(begin, sizeof begin, "{\"event\":\"%s\",", name);
-    const char *event = strstr(said, begin);
+    const char *event = strstr(text_sent, begin);
     TEST_ASSERT_NOT_NULL_MESSAGE(event, begin);
     (void)snprintf(line, sizeof line, "%.*s", (int)strcspn(event, "\n"), event);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(line, part), line);
@@ -116,14 +116,14 @@ TEST(test_events_are_complete_and_do_not_wait_for_the_rate) {
     do {
         (void)said_after("");
     } while (daemon_rig.daemon->answers.served[0].client.next_us < daemon_rig.now_us + MS(500));
-    const char *said = said_after("{\"cmd\":\"arm\",\"name\":\"pendant\"}\n");
-    assert_told(said, "lease", "\"change\":\"gained\"");
-    assert_told(said, "lease", "\"name\":\"pendant\"");
-    assert_told(said, "state", "\"state\":\"armed\"");
-    said = said_after("{\"cmd\":\"stop\"}\n");
-    assert_told(said, "stop", "\"cause\":\"client_stop\"");
-    assert_told(said, "stop", "\"client_name\":\"pendant\"");
-    assert_told(said, "lease", "\"change\":\"lost\"");
+    const char *text_sent = said_after("{\"cmd\":\"arm\",\"name\":\"pendant\"}\n");
+    assert_told(text_sent, "lease", "\"change\":\"gained\"");
+    assert_told(text_sent, "lease", "\"name\":\"pendant\"");
+    assert_told(text_sent, "state", "\"state\":\"armed\"");
+    text_sent = said_after("{\"cmd\":\"stop\"}\n");
+    assert_told(text_sent, "stop", "\"cause\":\"client_stop\"");
+    assert_told(text_sent, "stop", "\"client_name\":\"pendant\"");
+    assert_told(text_sent, "lease", "\"change\":\"lost\"");
     daemon_rig.bus = IW_BUS_OFF;
     assert_told(said_after(""), "bus", "\"state\":\"bus_off\"");
 }
@@ -160,35 +160,36 @@ TEST(test_arm_ended_by_estop_is_refused_with_id_and_reason) {
     static const char arm[] = "{\"id\":41,\"cmd\":\"arm\"}\n";
     TEST_ASSERT_EQUAL_INT((int)sizeof arm - 1, (int)send(client, arm, sizeof arm - 1U, MSG_NOSIGNAL));
     TEST_ASSERT_EQUAL_INT((int)sizeof estop - 1, (int)send(other, estop, sizeof estop - 1U, MSG_NOSIGNAL));
-    const char *said = said_after("");
+    const char *text_sent = said_after("");
     TEST_ASSERT_NOT_NULL_MESSAGE(
-        strstr(said, "\"id\":41,\"ok\":false,\"error\":\"cause_present\",\"message\":\"estop_software"), said);
+        strstr(text_sent, "\"id\":41,\"ok\":false,\"error\":\"cause_present\",\"message\":\"estop_software"),
+        text_sent);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(daemon_rig_log(), "smoke"), daemon_rig_log());
     (void)close(other);
 }
 
 TEST(test_tare_replies_with_the_window_of_each_wheel) {
     static const char *const sides[IW_SIDES] = {"left", "right"};
-    char told[64];
+    char found[64];
     daemon_rig_run(3000);
     const char *reply = daemon_rig_ask(client, "{\"cmd\":\"tare\"}");
-    const iw_force_quality_t *kept = daemon_rig.daemon->assumptions.tare;
+    const iw_force_quality_t *stored = daemon_rig.daemon->assumptions.tare;
     const iw_force_t *force = daemon_rig.daemon->wheels.core.force;
-    TEST_ASSERT_NOT_EQUAL_INT(kept[IW_LEFT].deviation_mN, kept[IW_RIGHT].deviation_mN);
+    TEST_ASSERT_NOT_EQUAL_INT(stored[IW_LEFT].deviation_mN, stored[IW_RIGHT].deviation_mN);
     for (unsigned side = 0; side < IW_SIDES; side++) {
-        TEST_ASSERT_EQUAL_INT(iw_force_measure(&force[side]).deviation_mN, kept[side].deviation_mN);
-        (void)snprintf(told, sizeof told, "\"%s\":{\"offset_mN\":%d,\"samples\":%d,\"deviation_mN\":%d,", sides[side],
-                       (int)force[side].offset_mN, (int)kept[side].samples, (int)kept[side].deviation_mN);
-        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, told), reply);
+        TEST_ASSERT_EQUAL_INT(iw_force_measure(&force[side]).deviation_mN, stored[side].deviation_mN);
+        (void)snprintf(found, sizeof found, "\"%s\":{\"offset_mN\":%d,\"samples\":%d,\"deviation_mN\":%d,", sides[side],
+                       (int)force[side].offset_mN, (int)stored[side].samples, (int)stored[side].deviation_mN);
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, found), reply);
     }
 }
 
 TEST(test_request_after_an_arm_is_answered_after_it) {
     (void)said_after("");
-    const char *said = said_after("{\"id\":1,\"cmd\":\"arm\"}\n{\"id\":2,\"cmd\":\"hello\"}\n");
-    const char *first = strstr(said, "\"id\":1,\"ok\":true");
-    TEST_ASSERT_NOT_NULL_MESSAGE(first, said);
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(first, "\"id\":2,\"ok\":true"), said);
+    const char *text_sent = said_after("{\"id\":1,\"cmd\":\"arm\"}\n{\"id\":2,\"cmd\":\"hello\"}\n");
+    const char *first = strstr(text_sent, "\"id\":1,\"ok\":true");
+    TEST_ASSERT_NOT_NULL_MESSAGE(first, text_sent);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(first, "\"id\":2,\"ok\":true"), text_sent);
 }
 
 TEST(test_refusal_of_recordings_and_arm_has_the_reason) {
@@ -224,8 +225,8 @@ TEST(test_battery_low_names_its_wheel_and_fault_is_reported_once) {
 TEST(test_frame_event_is_complete) {
     (void)said_after("{\"cmd\":\"watch\",\"topics\":[\"frame\"]}\n");
     daemon_rig_run(200);
-    const char *said = said_after("");
-    assert_told(said, "frame", "\"data\":");
+    const char *text_sent = said_after("");
+    assert_told(text_sent, "frame", "\"data\":");
 }
 
 TEST(test_button_uses_the_configured_debounce_time) {
