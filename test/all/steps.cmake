@@ -100,7 +100,7 @@ test(idle ros2.hours check+full safety default ${B}/app/bridge/ros2/iwheel-ros2 
 test(real ros2 check+full realtime default "${B}/app/bridge/ros2/iwheel-ros2 py:cyclonedds py:rosbags py:pytest" 46 ${PYTEST} test/ros2 --build ${B} --jobs 4 --ignore test/ros2/test_typed.py)
 # Programs by other authors. Without ROS 2 Jazzy, which ./check installs, these scenarios are skipped.
 test(real ros2.typed check+full foreign default "${B}/app/bridge/ros2/iwheel-ros2 py:cyclonedds py:rosbags py:pytest" 90 ${PYTEST} test/ros2/test_typed.py --build ${B} --jobs 2)
-test(real ros2.kilted ci foreign default "${B}/app/bridge/ros2/iwheel-ros2 py:cyclonedds py:rosbags py:pytest" 60 env IWHEEL_ROS=build/ros-kilted ${PYTEST} test/ros2/test_typed.py --build ${B} --jobs 2 -k "graph_fastrtps or services_fastrtps or publishers or drive")
+test(real kilted ci foreign default "${B}/app/bridge/ros2/iwheel-ros2 py:cyclonedds py:rosbags py:pytest" 60 env IWHEEL_ROS=build/ros-kilted ${PYTEST} test/ros2/test_typed.py --build ${B} --jobs 2 -k "graph_fastrtps or services_fastrtps or publishers or drive")
 test(idle mqtt.hours check+full safety default ${B}/app/bridge/mqtt/iwheel-mqtt 10 ${B}/test/mqtt/mqtt_hours)
 test(real mqtt check+full realtime default "${B}/app/bridge/mqtt/iwheel-mqtt py:paho.mqtt py:pytest mosquitto openssl" 94 ${PYTEST} test/mqtt --build ${B} --jobs 3)
 test(real serial check+full realtime default py:pytest 40 ${PYTEST} test/serial/test_wires.py --build ${B} --jobs 4)
