@@ -16,7 +16,7 @@ from story import TOTAL, Failed, Story
 
 # Wide limits for a busy machine, because the process that simulates the wheels may have to wait for the processor.
 CONFIG = {"limits": {"wheel_silent_ms": 200, "echo_ms": 200}, "drive": {"lease_ms": 500, "max_speed_mm_s": 700}}
-STALL_S, QUIET_S = 0.1, 0.005
+STALL_S, QUIET_S, AGAIN_S = 0.1, 0.005, 0.01
 
 
 def keep(rig):
@@ -94,8 +94,9 @@ class Interrupts:
 
     def __init__(self):
         self.listens, self.came, self.pid = False, False, os.getpid()
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGALRM):
             signal.signal(number, self.take)
+        sys.unraisablehook = self.raise_again
 
     def take(self, _number, _frame):
         if os.getpid() != self.pid:  # A child before its exec.
@@ -104,6 +105,14 @@ class Interrupts:
         if self.listens:
             self.listens = False
             raise KeyboardInterrupt
+
+    def raise_again(self, ignored):
+        """Python ignores an exception in some of its callbacks, for example those of fork. An interrupt there is raised again by a timer."""
+        if not isinstance(ignored.exc_value, KeyboardInterrupt):
+            sys.__unraisablehook__(ignored)
+            return
+        self.listens = True
+        signal.setitimer(signal.ITIMER_REAL, AGAIN_S)
 
     def __enter__(self):
         self.listens = True

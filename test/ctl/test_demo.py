@@ -16,6 +16,21 @@ ROOT = os.path.abspath(os.path.join(os.path.dirname(os.path.abspath(__file__)), 
 BUILD = os.environ["IWHEEL_BUILD"]
 
 
+IN_A_CALLBACK = """
+import os, signal, time
+import main
+interrupts = main.Interrupts()
+os.register_at_fork(before=lambda: os.kill(os.getpid(), signal.SIGINT))
+try:
+    with interrupts:
+        if os.fork() == 0:
+            os._exit(0)
+        time.sleep(20)
+except KeyboardInterrupt:
+    print("ended")
+"""
+
+
 def play(seconds, signals=(signal.SIGINT,), spacing=0.0, words=("--plain",), begun=True):
     """(exit code, what is left in its temporary folder, its processes that still run, its output). The signals come `seconds` after its first
     line, or after its start if not `begun`."""
@@ -69,6 +84,11 @@ class Interrupted(unittest.TestCase):
     def test_other_signals_that_end_it(self):
         for code, left, running, said in (play(3.0, (number,)) for number in (signal.SIGTERM, signal.SIGHUP)):
             self.assertEqual((130, [], []), (code, left, running), said)
+
+    def test_ctrl_c_in_a_callback_of_fork_ends_it(self):
+        demo = os.path.join(ROOT, "app", "demo")
+        done = subprocess.run([sys.executable, "-c", IN_A_CALLBACK], cwd=demo, capture_output=True, text=True, timeout=30, check=False)
+        self.assertEqual(("ended\n", ""), (done.stdout, done.stderr))
 
     def play_with(self, program):
         """What comes of it when the programs are this script, and nothing is left behind."""
