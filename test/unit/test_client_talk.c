@@ -102,8 +102,13 @@ TEST(test_connect_without_greeting_times_out) {
 }
 
 TEST(test_connect_another_service_is_garbled) {
-    static const char *const first[] = {"ok iwheel-sim\n",          "[1]\n", "{\"event\":\"hi\"}\n",
-                                        "{\"id\":1,\"ok\":true}\n", "{}\n",  "{\"ok\":true,\"event\":\"hello\"}\n"};
+    static const char *const first[] = {"ok iwheel-sim\n",
+                                        "[1]\n",
+                                        "{\"event\":\"hi\"}\n",
+                                        "{\"id\":1,\"ok\":true}\n",
+                                        "{}\n",
+                                        "{\"ok\":true,\"event\":\"hello\"}\n",
+                                        "{\"event\":\"hello\",\"api\":1,\"api\":1}\n"};
     for (size_t i = 0; i < sizeof first / sizeof first[0]; i++) {
         TEST_ASSERT_EQUAL_MESSAGE(IWC_GARBLED, adopt_with(first[i]), first[i]);
         TEST_ASSERT_EQUAL_INT(-1, iwc_fd(gateway));

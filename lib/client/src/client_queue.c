@@ -50,15 +50,22 @@ static bool admit_reply(iwc_t *self, iwc_span_t line) {
     return !has_id || is_odd(id);
 }
 
-/// Returns false if the line is not a message. Does not search for equal names in a line that begins like an event of
-/// the gateway.
+/// Returns true if the line begins like an event of the gateway. The greeting is not trusted: another program may have
+/// sent it.
+static bool is_trusted(iwc_span_t line) {
+    static const char hello[] = "{\"event\":\"hello\"";
+    return line.length > sizeof hello && memcmp(line.at, EVENT, sizeof EVENT - 1U) == 0 &&
+           memcmp(line.at, hello, sizeof hello - 1U) != 0;
+}
+
+/// Returns false if the line is not a message. Does not search for equal names in a trusted line.
 static bool admit_line(iwc_t *self, iwc_span_t line) {
-    const bool begins = line.length > sizeof EVENT && memcmp(line.at, EVENT, sizeof EVENT - 1U) == 0;
-    if (line.length > IWC_LINE_MAX || !iwc_json_is_object(line.at, line.length, begins)) {
+    const bool trusted = is_trusted(line);
+    if (line.length > IWC_LINE_MAX || !iwc_json_is_object(line.at, line.length, trusted)) {
         return false;
     }
-    const bool is_event = begins || iwc_json_find(line, "event").at != NULL;
-    const bool is_reply = !begins && iwc_json_find(line, "ok").at != NULL;
+    const bool is_event = trusted || iwc_json_find(line, "event").at != NULL;
+    const bool is_reply = !trusted && iwc_json_find(line, "ok").at != NULL;
     if (is_reply && !is_event && !admit_reply(self, line)) {
         self->in[line.at - self->in] = STRUCK;
     }
