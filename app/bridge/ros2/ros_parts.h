@@ -39,7 +39,7 @@ typedef enum {
 } writer_t;
 
 /// Replies that can wait at the same time. If there are more, the oldest is sent immediately.
-#define ROS_WAITING 8U
+#define ROS_WAITING ROS_MARKS
 
 /// A reply whose caller DDS does not know as a reader yet. DDS would send it to no reader.
 typedef struct {

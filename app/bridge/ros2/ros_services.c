@@ -174,7 +174,8 @@ bool ros_open_service(ros_t *self, ros_verb_t verb) {
         (void)dds_set_listener(self->replies[verb], listener);
         dds_delete_listener(listener);
     }
-    self->requests[verb] = ros_reader(self, topic_of(self, verb, false), ros_qos(user_data, 10, true, false), ros_wake);
+    self->requests[verb] =
+        ros_reader(self, topic_of(self, verb, false), ros_qos(user_data, (int32_t)ROS_MARKS, true, false), ros_wake);
     return self->requests[verb] > 0 && self->replies[verb] > 0;
 }
 

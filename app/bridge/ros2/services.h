@@ -17,8 +17,9 @@
 #define ROS_GUID_SIZE 16U
 /// Most bytes that `ros_service_mark` adds to a reply.
 #define ROS_MARK_SIZE 60U
-/// Replies of one writer that DDS stores, and that a late reader may still request.
-#define ROS_MARKS 10U
+/// Requests and replies of one service that DDS stores. So many calls can be in flight; of more calls, the oldest get no
+/// reply.
+#define ROS_MARKS 32U
 /// Number of writers of replies.
 #define ROS_MARK_WRITERS 4U
 
