@@ -158,7 +158,8 @@ iw_stop_budget_t iw_config_stop_budget(const iw_config_t *config) {
     const uint32_t speed = config->max_speed_mm_s;
     const uint32_t wait_ms = (uint32_t)config->lease_ms + config->period_ms;
     iw_stop_budget_t budget;
-    // Worst case: the lease ends directly after a pair, with both wheels at the maximum speed. The distance of the ramp is v*v/2a.
+    // Worst case: the lease ends directly after a pair, with both wheels at the maximum speed. The distance of the
+    // ramp is v*v/2a.
     budget.client_lost_ms = client_lost_ms(config);
     const uint32_t lost_mm = divide_up(speed * wait_ms, 1000U) + divide_up(speed * speed, 2U * config->decel_mm_s2);
     budget.client_lost_mm = real_mm(config, lost_mm);

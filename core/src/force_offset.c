@@ -137,7 +137,7 @@ static IW_APART bool within(int32_t difference, int32_t whole, int32_t percent) 
     return iw_abs(difference) * 100 <= whole * percent;
 }
 
-/// At standstill, raw divided by offset is about 10 (cN), 1 (dN) or 0 (offset already removed). The ranges do not overlap,
+/// At standstill, raw by offset is about 10 (cN), 1 (dN) or 0 (offset already removed). The ranges do not overlap,
 /// since each is narrower than the gap to the next. A ratio outside all of them is unclear.
 static iw_unit_observation_t weigh(int32_t mean_raw, int32_t offset_dN) {
     const int32_t offset = iw_abs(offset_dN);

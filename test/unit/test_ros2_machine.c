@@ -251,7 +251,7 @@ static void expect(ros_tells_t which, ros_level_t level, const char *part) {
 
 TEST(test_diagnosis_button_never_pressed_is_a_warning) {
     facts.machine.estop_tried = false;
-    expect(ROS_TELLS_ESTOP, ROS_WARN, "never seen to work");
+    expect(ROS_TELLS_ESTOP, ROS_WARN, "never tried on this wiring");
     facts.machine.estop_simulated = true;
     expect(ROS_TELLS_ESTOP, ROS_OK, "released");
 }

@@ -6,7 +6,7 @@
 /// and "only has sense if you don't apply any force to the shaft during the first two seconds". The wheel sends its
 /// own offset only in its first 60 s. The offset therefore has a provenance, and a bad offset is not used.
 ///
-///     OPEN --40 samples without a gap--> judged: GOOD -> its mean becomes ESTIMATED, unless there is a more trusted one
+///     OPEN --40 samples without a gap--> judged: GOOD -> its mean becomes ESTIMATED, unless a more trusted one exists
 ///       ^                                  any other (contaminated) -> no value from it
 ///       +--- wheel rebooted
 ///
@@ -15,7 +15,7 @@
 /// a reboot WHEEL and ESTIMATED become STORED. If the start of the wheel was observed, the core uses the wheel's offset
 /// only after its own window over the same two seconds was judged GOOD.
 ///
-/// Observation of the unit: at standstill, the raw value divided by the wheel's offset in dN is about 10 (cN), 1 (dN) or 0
+/// Observation of the unit: at standstill, raw value by the wheel's offset in dN is about 10 (cN), 1 (dN) or 0
 /// (offset already removed). Its effect on the force:
 ///
 /// | observation                | without a tare             | after a tare               |

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-/// @file The interface of client.h for C++11. The destructor closes the connection, which ends the lease, however the
+/// @file
+/// The interface of client.h for C++11. The destructor closes the connection, which ends the lease, however the
 /// scope ends.
 ///
 ///     iwheel::Client gateway;

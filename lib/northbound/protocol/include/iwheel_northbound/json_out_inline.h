@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-/// @file Bodies of the functions of json_out.h with a name argument. That header includes this file, or json_out.c
+/// @file
+/// Bodies of the functions of json_out.h with a name argument. That header includes this file, or json_out.c
 /// compiles it once.
 #ifndef IWHEEL_NORTHBOUND_JSON_OUT_INLINE_H
 #define IWHEEL_NORTHBOUND_JSON_OUT_INLINE_H
