@@ -22,7 +22,7 @@ OURS = re.compile(r"^(\d+) passed, (\d+) failed(?:, (\d+) skipped)?$", re.MULTIL
 NOT_JUDGED = re.compile(r"^real time not judged: .*\n\d+ passed, 0 failed, \d+ skipped$", re.MULTILINE)
 INCONCLUSIVE = re.compile(r"^(\d+) inconclusive", re.MULTILINE)
 PYTHON = re.compile(r"^Ran (\d+) tests? in .*\n\n(?:OK|FAILED)(.*)$", re.MULTILINE)
-REASON = re.compile(r"\d+: (E  |FAILED)")  # A line of pytest in the output of `start`.
+REASON = re.compile(r"\d+: (E  |FAILED|check: )")  # A line of pytest in the output of `start`.
 STARTED = re.compile(r"^layer=(\S+) status=(\d+) inconclusive=(\d+) processor_s=([\d.]+)$", re.MULTILINE)
 
 

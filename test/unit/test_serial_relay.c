@@ -552,7 +552,7 @@ static void test_relay_reason_follows_the_received_bytes(void) {
     run_logged(noise_after_nothing);
     TEST_ASSERT_EQUAL_UINT_MESSAGE(1, logged("warning: nothing comes"), complaints);
     TEST_ASSERT_EQUAL_UINT_MESSAGE(1, logged("warning: 760 bytes came"), complaints);
-    TEST_ASSERT_EQUAL_UINT_MESSAGE(1, logged("uses another protocol"), complaints);
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(1, logged("warning: /dev/iwheel-board uses another protocol"), complaints);
 }
 
 /// The port does not exist.
