@@ -438,7 +438,7 @@ class Record(WithRig):
         code, _, err = self.ctl("record", path, "--for", "1500ms")
         stream.stop()
         self.assertEqual(0, code, err)
-        self.assertIn("what the gateway on unix:", err)
+        self.assertIn("recording the frames of the gateway on unix:", err)
         lines = self.check(path)
         self.assertGreater(len([line for line in lines if line.endswith(" T\n")]), 100)
         self.assertEqual(64, self.ctl("record", path)[0])  # It is there already.

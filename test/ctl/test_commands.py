@@ -87,7 +87,7 @@ class Grammar(unittest.TestCase):
             self.assertEqual((64, f'iwheelctl: unknown verb "{typed}"; did you mean {meant}? All: iwheelctl help\n'), (code, err))
             code, _, same = run("help", typed)
             self.assertEqual((64, err), (code, same))
-        self.assertIn("known are: status top", run("xyzzy")[2])
+        self.assertIn("known verbs: status top", run("xyzzy")[2])
 
 
 class Web(unittest.TestCase):

@@ -488,7 +488,7 @@ class Check(unittest.TestCase):
         self.assertFalse(os.path.exists(self.rig.path("a")), "--check makes nothing")
         self.rig.start_gateway()
         self.rig.kill_gateway(signal.SIGTERM)
-        command = re.search(r"make it: (.*)$", text).group(1).replace("sudo ", "")
+        command = re.search(r"create it: (.*)$", text).group(1).replace("sudo ", "")
         subprocess.run(command, shell=True, check=True)
         self.assertEqual(0, self.gone("warn", "record"))
         for new in ("a/new", "a/new/"):

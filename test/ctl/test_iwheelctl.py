@@ -509,7 +509,7 @@ class Asking(WithGateway):
         out = " ".join(self.ctl("ledger")[1].split())
         for text in (
             "dlc: measured on the bus",
-            "force_unit_left = cN: at rest, raw / offset is 10.012",
+            "force_unit_left = cN: at standstill, raw / offset is 10.012",
             "track = 540: not documented, not verified",
             "wheel_radius = 192: the operator found something else",
             "disabled: no speed in mm/s and no distance; correct radius_mm",

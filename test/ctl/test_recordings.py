@@ -681,7 +681,7 @@ class Learn(unittest.TestCase):
             "1 reports of errors",
             "time goes back 1 times",
             "1 setpoints with a current beyond",
-            "1 setpoints have something behind",
+            "1 setpoints have nonzero bytes after the five",
             "819 (0x333)",
         ):
             self.assertIn(part, out)
