@@ -267,7 +267,7 @@ def test_recording_is_fetched_whole_and_overwrites_no_file(rig):
         done = subprocess.run([rig.program("iwheelctl"), verb, str(folder / "x.log")], capture_output=True, text=True, timeout=30, check=False)
         assert done.returncode == 0 and word in done.stdout, (verb, done.stdout[-500:], done.stderr)
     code, out, err = console(rig, config, "recording", ID, "-o", str(folder / "x"))
-    assert code == 73 and "there already" in err and len(list(folder.iterdir())) == 3, (code, err)
+    assert code == 73 and "exists already" in err and len(list(folder.iterdir())) == 3, (code, err)
     result = lines(console(rig, config, "recording", ID, str(int(name.split("-")[1])), "--json", "-o", str(folder / "y"))[1])[0]
     assert result["name"] == name and result["bytes"] == sum(Path(rig.path(name + ending)).stat().st_size for ending in FILES), result
     code, _, err = console(rig, config, "recording", ID, "99")

@@ -116,7 +116,7 @@ def meaningless_arguments(t):
         for option in valued.get(program, ("-c",)):
             code, text = call(rig, program, *common, option, "--version", seconds=2)
             t.check(code == USAGE, f"{program} {option} --version: exit code {code}: {text[:160]!r}")
-            t.check("--version" in text or "wants" in text, f"{program} {option}: names what is wrong: {text[:160]!r}")
+            t.check("--version" in text or "needs" in text, f"{program} {option}: names what is wrong: {text[:160]!r}")
             calls += 1
     t.check(not os.path.exists("--version"), "no file of that name was made")
     t.figure(f"{calls} calls")
