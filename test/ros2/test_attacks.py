@@ -116,9 +116,11 @@ def undecodable_requests(t):
     for verb in ("arm", "stop"):
         writers[verb] = Writer.of(ride.peer, Topic(ride.peer.participant, ride.peer.topic(f"iwheel/{verb}", "rq") + "Request", odd))
         writers[verb].await_match()
-    writers["arm"].write(odd(data="another type"))
+    for length in range(1, 24):  # Some are as long as a request.
+        writers["arm"].write(odd(data="another type of request"[:length]))
     time.sleep(0.5)
-    t.rule(ride.client.request("status")["state"] == "listening", "no writer has armed")
+    state = ride.client.request("status")["state"]
+    t.rule(state == "listening", f"no writer has armed: {state}")
     stream = ride.driving()
     t_us = now_us()
     writers["stop"].write(odd(data="another type"))

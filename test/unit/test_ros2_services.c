@@ -100,6 +100,12 @@ TEST(test_service_request_of_another_type_is_unreadable) {
         ros_service_read(payload, sizes[i], &caller);
         TEST_ASSERT_EQUAL_INT_MESSAGE(ROS_FORM_UNREADABLE, caller.form, "by its size");
     }
+    static const uint8_t text[21] = "\0\1\0\0\15\0\0\0another type";
+    static const uint8_t zero[21] = {0, 1};
+    ros_service_read(text, sizeof text, &caller);
+    TEST_ASSERT_EQUAL_INT_MESSAGE(ROS_FORM_UNREADABLE, caller.form, "by its number");
+    ros_service_read(zero, sizeof zero, &caller);
+    TEST_ASSERT_EQUAL_INT_MESSAGE(ROS_FORM_UNREADABLE, caller.form, "by its number");
     const uint8_t other[2][8] = {{0, 2}, {1, 1}};
     for (size_t i = 0; i < 2U; i++) {
         ros_service_read(other[i], 5, &caller);

@@ -17,8 +17,10 @@
 #define IDENTITY_SIZE      24U
 #define ENCAPSULATION      4U
 #define HEADER_GUID        8U
-#define REQUEST_SIZE       1U ///< structure_needs_at_least_one_member
-#define ALIGNED            4U
+/// Numbers of requests begin at 1. A larger number is text or another type.
+#define NUMBER_MAX   0xFFFFFFFFFF
+#define REQUEST_SIZE 1U ///< structure_needs_at_least_one_member
+#define ALIGNED      4U
 
 /// Reads a number of 64 bits in CDR's form.
 static int64_t read_long(const uint8_t *bytes, bool little) {
@@ -44,6 +46,9 @@ void ros_service_read(const uint8_t *payload, size_t size, ros_caller_t *caller)
             caller->guid[i] = bytes[(payload[1] == 1U) ? i : HEADER_GUID - 1U - i];
         }
         caller->number = read_long(bytes + HEADER_GUID, payload[1] == 1U);
+        if (caller->number < 1 || caller->number > NUMBER_MAX) {
+            caller->form = ROS_FORM_UNREADABLE;
+        }
     }
 }
 
