@@ -247,7 +247,7 @@ class Bringup(unittest.TestCase):
             text = file.read()
         self.assertAlmostEqual(620, int(self.value("wheels", "track_mm")), delta=8)
         self.assertEqual(9, text.count(", confirmed: "), text)
-        self.assertIn(f"The confirmed results are stored in {self.records}", operator.text)
+        self.assertIn(f"The confirmed results are stored in {self.records}", " ".join(operator.text.split()))
         self.assertEqual(["mine.conf", "mine.conf.from", "records"], sorted(os.listdir(self.folder.name)))
         self.gateway_takes_it()
         self.ledger_knows_it()
