@@ -281,8 +281,7 @@ static void draw_pair(const paper_t *paper, const json_t *pair) {
         text_integer(get(pair, "largest_mm"), "mm", largest);
         text_integer(get(pair, "limit_mm"), "mm", limit);
         paper_label(paper, "PAIR");
-        paper_say(paper, TONE_PLAIN, "largest deviation of the last drive: %s; stop at %s", largest,
-                  limit);
+        paper_say(paper, TONE_PLAIN, "largest deviation of the last drive: %s; stop at %s", largest, limit);
         paper_end(paper);
     }
 }
