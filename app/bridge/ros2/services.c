@@ -17,10 +17,9 @@
 #define IDENTITY_SIZE      24U
 #define ENCAPSULATION      4U
 #define HEADER_GUID        8U
-/// Numbers of requests begin at 1. A larger number is text or another type.
-#define NUMBER_MAX   0xFFFFFFFFFF
-#define REQUEST_SIZE 1U ///< structure_needs_at_least_one_member
-#define ALIGNED      4U
+#define NUMBER_MAX         0xFFFFFFFFFF ///< Requests count from 1: a larger number belongs to another type.
+#define REQUEST_SIZE       1U           ///< structure_needs_at_least_one_member
+#define ALIGNED            4U
 
 /// Reads a number of 64 bits in CDR's form.
 static int64_t read_long(const uint8_t *bytes, bool little) {
