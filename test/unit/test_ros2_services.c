@@ -94,7 +94,7 @@ TEST(test_service_request_of_cyclonedds_has_either_byte_order) {
 
 TEST(test_service_request_of_another_type_is_unreadable) {
     static const size_t sizes[] = {0, 1, 4, 9, 20, 25, 64};
-    const uint8_t payload[64] = {0, 1};
+    const uint8_t payload[64] = {0, 1, [12] = 1}; // With the size of a header, a request of number 1.
     for (size_t i = 0; i < sizeof sizes / sizeof sizes[0]; i++) {
         caller.form = ROS_FORM_HEADER;
         ros_service_read(payload, sizes[i], &caller);
