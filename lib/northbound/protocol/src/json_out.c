@@ -11,7 +11,7 @@
 #define EXTENDED_ID_MASK 0x1FFFFFFFU
 
 /// Reserves this number of bytes and returns their position; NULL: they do not fit, and the line is invalid.
-static char *take(iwn_out_t *self, size_t length) {
+static char *reserve(iwn_out_t *self, size_t length) {
     if (self->overflow || length >= self->size - self->length) {
         self->overflow = true;
         return NULL;
@@ -22,7 +22,7 @@ static char *take(iwn_out_t *self, size_t length) {
 }
 
 static void put(iwn_out_t *self, const char *text, size_t length) {
-    char *const at = take(self, length);
+    char *const at = reserve(self, length);
     if (at != NULL) {
         memcpy(at, text, length);
     }
@@ -32,7 +32,7 @@ static void put(iwn_out_t *self, const char *text, size_t length) {
 /// not fit.
 static char *begin(iwn_out_t *self, iwn_span_t name, size_t length) {
     const size_t comma = self->comma ? 1U : 0U;
-    char *at = take(self, comma + ((name.text != NULL) ? name.length + 3U : 0U) + length);
+    char *at = reserve(self, comma + ((name.text != NULL) ? name.length + 3U : 0U) + length);
     self->comma = true;
     if (at == NULL) {
         return NULL;
