@@ -74,9 +74,9 @@ TEST(test_host_config_read_stays_staged_and_flash_errors_show) {
     assert_answer("{\"cmd\":\"config\",\"key\":\"wheels.track_mm\",\"value\":541,\"id\":1}", "\"staged\":true");
     assert_answer("{\"cmd\":\"config\",\"id\":2}", "\"staged\":true");
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(answer, "\"key\":\"wheels.current_role\",\"value\":\"limit\""), answer);
-    keep_fails = true;
+    settings_fail = true;
     assert_answer("{\"cmd\":\"config\",\"commit\":true,\"id\":3}", "the flash did not accept it");
-    keep_fails = false;
+    settings_fail = false;
     TEST_ASSERT_EQUAL_UINT64(0, host.restart_us);
     assert_answer("{\"cmd\":\"config\",\"commit\":false,\"id\":4}", "\"staged\":false");
 }
