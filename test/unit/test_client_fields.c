@@ -44,10 +44,10 @@ static bool jansson_takes(const char *text, size_t length) {
 }
 
 static void compare(const char *text, size_t length) {
-    if (iwc_json_is_object(text, length, false) != jansson_takes(text, length)) {
+    if (iwc_json_is_object(text, length) != jansson_takes(text, length)) {
         char why[200];
         (void)snprintf(why, sizeof why, "%.*s", (length < 190) ? (int)length : 190, text);
-        TEST_ASSERT_EQUAL_MESSAGE(jansson_takes(text, length), iwc_json_is_object(text, length, false), why);
+        TEST_ASSERT_EQUAL_MESSAGE(jansson_takes(text, length), iwc_json_is_object(text, length), why);
     }
 }
 
@@ -66,10 +66,43 @@ TEST(test_json_every_changed_byte_agrees_with_jansson) {
             memcpy(text, STATUS, sizeof(STATUS));
             text[at] = bytes[i];
             compare(text, sizeof(STATUS) - 1U);
-            accepted += iwc_json_is_object(text, sizeof(STATUS) - 1U, false) ? 1U : 0U;
+            accepted += iwc_json_is_object(text, sizeof(STATUS) - 1U) ? 1U : 0U;
         }
     }
     TEST_ASSERT_GREATER_THAN(1000, accepted); // Both parsers also accept valid texts.
+}
+
+static bool is_trusted(const char *text, iwc_stored_t *stored) {
+    return iwc_json_is_trusted_object(text, strlen(text), stored);
+}
+
+TEST(test_json_ledger_is_stored_until_it_changes) {
+    static iwc_stored_t stored;
+    stored.length = 0;
+    TEST_ASSERT_TRUE(is_trusted("{\"event\":\"bus\",\"state\":\"active\"}", &stored));
+    TEST_ASSERT_EQUAL_size_t(0, stored.length);
+    TEST_ASSERT_TRUE(is_trusted("{\"t_us\":1,\"ledger\":{\"a\":[1]},\"clients\":1}", &stored));
+    TEST_ASSERT_EQUAL_STRING_LEN("{\"a\":[1]}", stored.value, stored.length);
+    TEST_ASSERT_TRUE(is_trusted("{\"t_us\":22,\"ledger\":{\"a\":[1]},\"clients\":1}", &stored));
+    TEST_ASSERT_FALSE(is_trusted("{\"t_us\":3,\"ledger\":{\"a\":[1]},\"clients\":}", &stored));
+    TEST_ASSERT_FALSE(is_trusted("{\"t_us\":3,\"ledger\":{\"a\":[2},\"clients\":1}", &stored));
+    TEST_ASSERT_EQUAL_size_t(strlen("{\"a\":[1]}"), stored.length);
+    TEST_ASSERT_TRUE(is_trusted("{\"t_us\":4,\"ledger\":{\"a\":[23]},\"clients\":1}", &stored));
+    TEST_ASSERT_EQUAL_STRING_LEN("{\"a\":[23]}", stored.value, stored.length);
+    TEST_ASSERT_TRUE(is_trusted("{\"t_us\":5,\"ledger\":null}", &stored));
+    TEST_ASSERT_EQUAL_STRING_LEN("{\"a\":[23]}", stored.value, stored.length);
+}
+
+TEST(test_json_ledger_beyond_its_buffer_is_not_stored) {
+    static iwc_stored_t stored;
+    static char text[IWC_STORED_MAX + 64U];
+    for (size_t more = 0; more < 2U; more++) {
+        stored.length = 0;
+        const int blanks = (int)(IWC_STORED_MAX - strlen("{}") + more);
+        const int length = snprintf(text, sizeof text, "{\"ledger\":{%*s}}", blanks, "");
+        TEST_ASSERT_TRUE(iwc_json_is_trusted_object(text, (size_t)length, &stored));
+        TEST_ASSERT_EQUAL_size_t((more == 0U) ? IWC_STORED_MAX : 0U, stored.length);
+    }
 }
 
 TEST(test_json_hard_cases_agree_with_jansson) {
@@ -132,7 +165,7 @@ TEST(test_json_nul_byte_is_refused_at_every_position) {
     for (size_t at = 0; at < sizeof(STATUS); at++) {
         memcpy(text, STATUS, sizeof(STATUS));
         text[at] = '\0';
-        TEST_ASSERT_FALSE(iwc_json_is_object(text, sizeof(STATUS) - ((at + 1U < sizeof(STATUS)) ? 1U : 0U), false));
+        TEST_ASSERT_FALSE(iwc_json_is_object(text, sizeof(STATUS) - ((at + 1U < sizeof(STATUS)) ? 1U : 0U)));
     }
 }
 
@@ -143,7 +176,7 @@ TEST(test_json_depth_is_bounded) {
         memset(text + 5, '[', depth);
         memset(text + 5 + depth, ']', depth);
         text[5 + 2U * depth] = '}';
-        TEST_ASSERT_EQUAL(depth < IWN_DEPTH_MAX, iwc_json_is_object(text, 6U + 2U * depth, false));
+        TEST_ASSERT_EQUAL(depth < IWN_DEPTH_MAX, iwc_json_is_object(text, 6U + 2U * depth));
     }
     TEST_ASSERT_EQUAL_CHAR('[', *inner);
 }
@@ -155,7 +188,7 @@ TEST(test_json_duplicate_of_the_first_of_many_keys_is_refused) {
         used += (size_t)snprintf(text + used, sizeof text - used, ",\"%x\":0", i + 0x10U);
     }
     used += (size_t)snprintf(text + used, sizeof text - used, ",\"a\":2}");
-    TEST_ASSERT_FALSE(iwc_json_is_object(text, used, false)); // The first keys are stored until the end.
+    TEST_ASSERT_FALSE(iwc_json_is_object(text, used)); // The first keys are stored until the end.
 }
 
 TEST(test_field_integers_must_be_whole_and_fit_64_bits) {
