@@ -208,6 +208,33 @@ TEST(test_field_integers_must_be_whole_and_fit_64_bits) {
     }
 }
 
+TEST(test_field_cursor_finds_fields_in_any_order) {
+    const iwc_message_t message = message_of("{\"a\":1,\"o\":{\"b\":2,\"c\":\"x\",\"b.d\":3},\"e\":true,\"a\":9}");
+    iwc_cursor_t cursor = {&message, NULL};
+    char text[8];
+    const iwc_message_t object = iwc_field(&cursor, "o");
+    TEST_ASSERT_EQUAL_INT64(2, iwc_integer(&object, "b").value);
+    TEST_ASSERT_TRUE(iwc_is(&object, "c", "x"));
+    const iwc_message_t last = iwc_field(&cursor, "e");
+    TEST_ASSERT_EQUAL_INT64(1, iwc_truth(&last, "").value);
+    const iwc_message_t behind = iwc_field(&cursor, "a");
+    TEST_ASSERT_EQUAL_INT64(9, iwc_integer(&behind, "").value);
+    const iwc_message_t none = iwc_field(&cursor, "x");
+    TEST_ASSERT_NULL(none.text);
+    TEST_ASSERT_FALSE(iwc_integer(&none, "").known || iwc_truth(&none, "").known || iwc_integer(&none, "a").known);
+    TEST_ASSERT_FALSE(iwc_text(&none, "", text, sizeof text) || iwc_is(&none, "", "") || iwc_is(&none, "a", "x"));
+    const iwc_message_t first = iwc_field(&cursor, "a");
+    TEST_ASSERT_EQUAL_INT64(1, iwc_integer(&first, "").value);
+    iwc_cursor_t inside = {&object, NULL};
+    const iwc_message_t name = iwc_field(&inside, "c");
+    TEST_ASSERT_TRUE(iwc_text(&name, "", text, sizeof text));
+    TEST_ASSERT_EQUAL_STRING("x", text);
+    const iwc_message_t dotted = iwc_field(&inside, "b.d");
+    TEST_ASSERT_EQUAL_INT64(3, iwc_integer(&dotted, "").value);
+    inside = (iwc_cursor_t){&name, NULL};
+    TEST_ASSERT_NULL(iwc_field(&inside, "c").text);
+}
+
 TEST(test_field_text_is_escaped_and_cut_between_characters) {
     const iwc_message_t message = message_of(STATUS);
     const iwc_message_t umlauts = message_of("{\"a\":\"\xc3\xa4\xc3\xa4\\u001b\"}");

@@ -68,6 +68,9 @@ iwc_span_t iwc_json_walk(iwc_walk_t *self, const char *key, size_t length) {
 
 iwc_span_t iwc_json_find(iwc_span_t object, const char *path) {
     size_t length = strcspn(path, ".");
+    if (path[0] == '\0') {
+        return object;
+    }
     while (path[length] == '.') {
         object = iwc_json_walk(&(iwc_walk_t){object, NULL}, path, length);
         path += length + 1U;

@@ -29,7 +29,7 @@ bool iwc_json_is_object(const char *text, size_t length);
 /// again. Stores the value if it has changed.
 bool iwc_json_is_trusted_object(const char *text, size_t length, iwc_stored_t *stored);
 
-/// Returns the value at a path of keys, "left.speed_mm_s". `iwc_json_is_object` must be true for the object. Compares
+/// Returns the value at a path of keys, "left.speed_mm_s", or the object itself for "". `iwc_json_is_object` must be true for the object. Compares
 /// keys byte by byte.
 iwc_span_t iwc_json_find(iwc_span_t object, const char *path);
 
