@@ -70,7 +70,7 @@ def rows_of(page):
 
 
 def files_of(root):
-    """Returns (name, text) of all files that may silence a tool."""
+    """Returns (name, text) of all files that may switch off a check of a tool."""
     for folder, folders, names in os.walk(root):
         folders[:] = sorted(name for name in folders if name not in ELSEWHERE)
         for name in sorted(names):

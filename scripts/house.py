@@ -265,8 +265,8 @@ def judge_list(title, section):
         elif not line_of(name, pattern):
             wrong.append(f"{where}: remove the line of `{name}`: it does not contain {pattern} any more")
     wrong += [f"{where}: `{name}` is listed twice" for name in set(listed) if listed.count(name) > 1]
-    beside = [name for name in re.findall(r"`([\w./-]+/[\w.-]+\.\w+)`", MARK.sub("", section)) if not (ROOT / name).exists()]
-    return wrong + [f"{where}: `{name}` does not exist" for name in sorted(set(beside) - set(listed))]
+    others = [name for name in re.findall(r"`([\w./-]+/[\w.-]+\.\w+)`", MARK.sub("", section)) if not (ROOT / name).exists()]
+    return wrong + [f"{where}: `{name}` does not exist" for name in sorted(set(others) - set(listed))]
 
 
 def judge_how_to_add():
@@ -329,8 +329,8 @@ CALLS_PIP = re.compile(r"""(?:\bpip3?"?|/pip"|"pip",)\s+"?install\b""")
 SAFE = re.compile(r"--require-hashes|--no-index|\(pip install|^\s*#")
 
 
-def wishes(group, table):
-    return [wish for one in table[group] for wish in (wishes(one["include-group"], table) if isinstance(one, dict) else [one])]
+def requirements(group, table):
+    return [requirement for one in table[group] for requirement in (requirements(one["include-group"], table) if isinstance(one, dict) else [one])]
 
 
 def pins_of_group(group, table):
@@ -341,15 +341,19 @@ def pins_of_group(group, table):
     found = [
         (name.lower(), version, Marker(marker or "os_name != ''"), sums, via) for name, version, marker, sums, via in PIN.findall((ROOT / file).read_text())
     ]
-    wanted = [Requirement(wish) for wish in wishes(group, table)]
+    wanted = [Requirement(requirement) for requirement in requirements(group, table)]
     print(f"{file}: {len(found)} pins of {len(wanted)} requirements")
     yield from (f"{file}: {name} {version} has no checksum" for name, version, _, sums, _ in found if not sums)
-    yield from (f"{file}: {name} is pinned, but not required" for name, *_, via in found if "via" not in via and name not in {wish.name for wish in wanted})
-    for wish, python, machine in ((wish, python, machine) for wish in wanted for python in PYTHONS for machine in MACHINES):
+    yield from (
+        f"{file}: {name} is pinned, but not required"
+        for name, *_, via in found
+        if "via" not in via and name not in {requirement.name for requirement in wanted}
+    )
+    for requirement, python, machine in ((requirement, python, machine) for requirement in wanted for python in PYTHONS for machine in MACHINES):
         where = {"python_version": python, "python_full_version": f"{python}.0", "platform_machine": machine, "sys_platform": "linux"}
-        fits = [name for name, version, marker, *_ in found if name == wish.name and wish.specifier.contains(version) and marker.evaluate(where)]
-        if len(fits) != 1 and (wish.marker is None or wish.marker.evaluate(where)):
-            yield f"{file}: {wish}: {len(fits)} pins for Python {python} on {machine}; write the list again: see pyproject.toml"
+        fits = [name for name, version, marker, *_ in found if name == requirement.name and requirement.specifier.contains(version) and marker.evaluate(where)]
+        if len(fits) != 1 and (requirement.marker is None or requirement.marker.evaluate(where)):
+            yield f"{file}: {requirement}: {len(fits)} pins for Python {python} on {machine}; write the list again: see pyproject.toml"
 
 
 def pins():

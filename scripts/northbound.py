@@ -66,8 +66,8 @@ from typing import Literal, TypedDict
 '''
 
 
-def docstring(told):
-    return '    """' + re.sub(r"\bnull\b", "None", told["what"]) + '"""'
+def docstring(field):
+    return '    """' + re.sub(r"\bnull\b", "None", field["what"]) + '"""'
 
 
 def camel(name):
@@ -192,8 +192,8 @@ def c_fields(description):
             rows.setdefault(row, []).append(f"BIT({cmd.upper()})")
     fields = c_macro("IWN_REQUEST_FIELDS(ROW)", [f"ROW({', '.join(row)}, {' | '.join(bits)})" for row, bits in rows.items()])
     names = c_macro("IWN_REQUEST_NAMES(NAME)", [f"NAME({cmd})" for cmd in description.requests])
-    told = "/// Name, member of iwn_request_t, kind, largest size of a text in bytes, required, requests with this field.\n"
-    return f"{FIELDS_HEADER}{names}\n\n{told}{fields}\n\n#endif\n"
+    comment = "/// Name, member of iwn_request_t, kind, largest size of a text in bytes, required, requests with this field.\n"
+    return f"{FIELDS_HEADER}{names}\n\n{comment}{fields}\n\n#endif\n"
 
 
 def main(arguments):

@@ -6,7 +6,7 @@ Also fails unless each interface of the threat model in docs/developer/threat-mo
 usage: safety_case.py [--update]
 
 --update writes the lists of seeded faults and of the fault catalogue's tests, which are generated from the sources.
-The last line is "N passed, N failed, N skipped". No tool does it: doorstop and StrictDoc (PyPI) keep requirements and links in files of their own form,
+The last line is "N passed, N failed, N skipped". No tool does it: doorstop and StrictDoc (PyPI) store requirements and links in files of their own form,
 and do not know seeded faults.
 """
 
@@ -104,9 +104,9 @@ def findings(text, tests, bugs, rules):
     for bug in bugs:
         if bug.rule not in found and not any(ROOT.glob(f"docs/*/{bug.rule}.md")):
             yield f"seeded fault {bug.name} belongs to {bug.rule}, which is neither on this page nor a page of docs/"
-    told = set(re.findall(r"\d+", " ".join(entry.get("oracle", "") for entry in found.values())))
-    yield from (f"rule {number} of the oracle belongs to no rule on this page" for number in sorted(rules - told))
-    yield from (f"the oracle has no rule {number}" for number in sorted(told - rules))
+    stated = set(re.findall(r"\d+", " ".join(entry.get("oracle", "") for entry in found.values())))
+    yield from (f"rule {number} of the oracle belongs to no rule on this page" for number in sorted(rules - stated))
+    yield from (f"the oracle has no rule {number}" for number in sorted(stated - rules))
     answered = re.findall(r"^\| (H\d+) .*\| (R\d+(?:, R\d+)*) \|$", text, re.M)
     for hazard, by in answered:
         yield from (f"{hazard}: {rule} is not on this page" for rule in by.split(", ") if rule not in found)
@@ -186,12 +186,12 @@ def main(arguments):
         text = update(text, tests, bugs)
         PAGE.write_text(text)
     found = [*findings(text, tests, bugs, rules), *threat_findings(THREATS.read_text(), tests)]
-    missed, planted = self_test(text, tests, bugs, rules)
+    missed, seeded = self_test(text, tests, bugs, rules)
     print(*(f"failed: {finding}" for finding in found), sep="\n", end="\n" if found else "")
     if missed:
-        print(f"failed: {missed} of {planted} faults seeded in the page are not found")
+        print(f"failed: {missed} of {seeded} faults seeded in the page are not found")
     print(f"{len(sections(text))} rules, {len(bugs)} seeded faults, {len(rules)} rules of the oracle")
-    print(f"{len(sections(text)) + planted - missed - (1 if found else 0)} passed, {len(found) + missed} failed, 0 skipped")
+    print(f"{len(sections(text)) + seeded - missed - (1 if found else 0)} passed, {len(found) + missed} failed, 0 skipped")
     return 1 if found or missed else 0
 
 

@@ -147,14 +147,14 @@ def uplot(files):
     """Returns the plot library in the page with the pins of scripts/web_assets."""
     name, paths = UPLOT
     version, pinned = re.search(rf"^bring {name} (\S+) (\S+)", (ROOT / "scripts/web_assets").read_text(), re.M).groups()
-    told = "; ".join(f"{PAGE}/{file} is {paths[file]}, sha256 {files[file]}" for file in sorted(files) if file in paths)
+    comment = "; ".join(f"{PAGE}/{file} is {paths[file]}, sha256 {files[file]}" for file in sorted(files) if file in paths)
     return package(
         name,
         version,
         checksums=[{"algorithm": "SHA512", "checksumValue": base64.b64decode(pinned).hex()}],
         licenseConcluded="MIT",
         licenseDeclared="MIT",
-        comment=told,
+        comment=comment,
         externalRefs=[{"referenceCategory": "PACKAGE-MANAGER", "referenceType": "purl", "referenceLocator": f"pkg:npm/{name}@{version}"}],
     )
 

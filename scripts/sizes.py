@@ -161,12 +161,12 @@ def stack_room(elf):
 def image_sizes(build, image):
     """Returns (flash, RAM without stack, worst stack). Fails if the stack does not fit."""
     elf, used = next(Path(build).rglob(f"{image}.elf")), image_stack(build, image)
-    room = stack_room(elf)
-    if used > room:
-        raise SystemExit(f"{image} needs {used} B of stack, sections.ld has {room} B")
+    space = stack_room(elf)
+    if used > space:
+        raise SystemExit(f"{image} needs {used} B of stack, sections.ld has {space} B")
     run = subprocess.run(["arm-none-eabi-size", str(elf)], capture_output=True, text=True, check=True)
     text, data, bss = map(int, run.stdout.splitlines()[1].split()[:3])
-    return text + data, data + bss - room, used
+    return text + data, data + bss - space, used
 
 
 def stacks_and_images(builds):

@@ -66,7 +66,7 @@ def bridge(rig, name, port):
     rig.processes.append(Process([find_program(rig.build, "iwheel-mqtt"), "-c", config], rig.path("mqtt.out")))
 
 
-def tell(rigs, console, keeps, iwheelctl):
+def report(rigs, console, storage, iwheelctl):
     """Shows the console while one machine is stopped and the gateway of another one is killed, then the history and the recording. Returns an exit code."""
     with subprocess.Popen([*console, "--for", "6"], stdout=subprocess.PIPE, text=True) as watching:
         time.sleep(3)
@@ -74,11 +74,11 @@ def tell(rigs, console, keeps, iwheelctl):
         rigs[-1].gateway.signal(signal.SIGKILL)
         text = watching.communicate()[0]
     print(text)
-    told = f"{len(rigs)} machines, {len(rigs) - 1} online" in text and "estop_line" in text
-    print("walker-1 was stopped by its button, the last one's gateway was killed" + ("" if told else ": NOT REPORTED"))
+    reported = f"{len(rigs)} machines, {len(rigs) - 1} online" in text and "estop_line" in text
+    print("walker-1 was stopped by its button, the last one's gateway was killed" + ("" if reported else ": NOT REPORTED"))
     frames = rigs[0].path("fetched.log")
     for words in (
-        [*console, "history", "--last", "5min"] if keeps else None,
+        [*console, "history", "--last", "5min"] if storage else None,
         [*console, "recording", "walker-1", "--output", frames],
         [iwheelctl, "why", frames, "--frames", "1"],
     ):
@@ -86,8 +86,8 @@ def tell(rigs, console, keeps, iwheelctl):
             print(f"\n$ {' '.join([Path(words[0]).name, *words[1:]])}", flush=True)
             done = subprocess.run(words, check=False, capture_output=True, text=True)
             print(done.stdout + done.stderr, end="", flush=True)
-            told = told and done.returncode == 0 and ("walker-1" in done.stdout or words[0] == iwheelctl)
-    return 0 if told else 1
+            reported = reported and done.returncode == 0 and ("walker-1" in done.stdout or words[0] == iwheelctl)
+    return 0 if reported else 1
 
 
 def main():
@@ -98,24 +98,24 @@ def main():
     parser.add_argument("--plain", action="store_true")
     options = parser.parse_args()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
-    rigs, keeps = [], ""
+    rigs, storage = [], ""
     try:
         for number in range(options.machines):
             rigs.append(Rig(options.build, CONFIG))
             if number == 0:
-                keeps = broker(rigs[0], options.port)
+                storage = broker(rigs[0], options.port)
             rigs[-1].start_gateway()
             bridge(rigs[-1], f"walker-{number + 1}", options.port)
-        config = write(rigs[0].path("fleet.conf"), f"[broker]\nport = {options.port}\n{keeps}")
+        config = write(rigs[0].path("fleet.conf"), f"[broker]\nport = {options.port}\n{storage}")
         console = [find_program(options.build, "iwheel-fleet"), "-c", config]
         if options.plain or not sys.stdout.isatty():
-            return tell(rigs, console, keeps, find_program(options.build, "iwheelctl"))
+            return report(rigs, console, storage, find_program(options.build, "iwheelctl"))
         again = " ".join([os.path.relpath(console[0]), *console[1:]])
         sim = os.path.relpath(find_program(options.build, "iwheel-sim"))
         print(
             f"{options.machines} machines at the broker on port {options.port}. In another terminal:\n\n"
             f"    {sim} --control {rigs[0].path('control')} estop press\n    {again} recording walker-1\n"
-            + (f"    {again} history --last 5min\n" if keeps else ""),
+            + (f"    {again} history --last 5min\n" if storage else ""),
             flush=True,
         )
         time.sleep(5)

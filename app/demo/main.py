@@ -19,7 +19,7 @@ CONFIG = {"limits": {"wheel_silent_ms": 200, "echo_ms": 200}, "drive": {"lease_m
 STALL_S, QUIET_S, AGAIN_S = 0.1, 0.005, 0.01
 
 
-def keep(rig):
+def serve(rig):
     """Leaves all processes running and prints commands to try."""
     tool = os.path.relpath(find_program(rig.build, "iwheelctl"))
     sim = os.path.relpath(find_program(rig.build, "iwheel-sim"))
@@ -57,10 +57,10 @@ def parse():
     return parser.parse_args()
 
 
-def tell(story, view, sleeper, interrupts):
+def show(story, view, sleeper, interrupts):
     try:
         with interrupts:
-            story.tell()
+            story.run()
     finally:
         view.close()
         for driver in story.drivers:
@@ -95,10 +95,10 @@ class Interrupts:
     def __init__(self):
         self.listens, self.came, self.pid = False, False, os.getpid()
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGALRM):
-            signal.signal(number, self.take)
+            signal.signal(number, self.note)
         sys.unraisablehook = self.raise_again
 
-    def take(self, _number, _frame):
+    def note(self, _number, _frame):
         if os.getpid() != self.pid:  # A child before its exec.
             os._exit(130)
         self.came = True
@@ -136,10 +136,10 @@ def run(options, interrupts):
     view = choose(sys.stdout, options.plain)
     story = Story(rig, view)
     try:
-        tell(story, view, sleeper, interrupts)
+        show(story, view, sleeper, interrupts)
         if options.keep:
             with interrupts:
-                keep(rig)
+                serve(rig)
         else:
             print("Try it yourself: ./demo --keep")
         return 0

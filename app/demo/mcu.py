@@ -29,7 +29,7 @@ class Story:
         self.socket = str(self.folder / "gateway.sock")
         self.processes = []
 
-    def tell(self, text):
+    def show(self, text):
         print(f"[{time.monotonic() - self.begin:5.1f} s] {text}", flush=True)
 
     def start(self, name, command):
@@ -54,7 +54,7 @@ class Story:
         raise Failed(f"{pattern!r} was not printed within {seconds} s; the last output: {text[-400:]}")
 
     def ctl(self, *words):
-        self.tell("$ iwheelctl " + " ".join(words))
+        self.show("$ iwheelctl " + " ".join(words))
         done = subprocess.run([self.build / "app/ctl/iwheelctl", "--socket", self.socket, *words], capture_output=True, text=True, check=False)
         for line in (done.stdout + done.stderr).splitlines()[:8]:
             print("          " + line, flush=True)
@@ -62,22 +62,22 @@ class Story:
             raise Failed(f"iwheelctl {words[0]} ended with {done.returncode}")
 
     def play(self):
-        self.tell("building the image gateway (some seconds)")
+        self.show("building the image gateway (some seconds)")
         bus = self.start("emulator", [ROOT / "app/demo/emulate", "--image", "gateway", "--every", "0.5"])
         port = self.wait(bus, r"serial port is (/dev/pts/\d+)", BUILD_S)[1]
-        self.tell(f"an emulated CPU runs it; its serial port is {port}")
+        self.show(f"an emulated CPU runs it; its serial port is {port}")
         settings = self.folder / "serial.conf"
         settings.write_text("[northbound]\ngroup = none\n", encoding="ascii")
         relay = self.start("relay", [self.build / "app/bridge/serial/iwheel-serial", "-c", settings, "--port", port, "--socket", self.socket])
         said = self.wait(relay, r"board on \S+: start (\w+), version (\S+)", READY_S)
-        self.tell(f"iwheel-serial has connected: start {said[1]}, version {said[2]}")
+        self.show(f"iwheel-serial has connected: start {said[1]}, version {said[2]}")
         self.ctl("drive", "200", "200", "--for", "2s")
         turned = [float(speed) for speed in re.findall(r"left (-?\d+) mm/s", bus.read_text(errors="replace"))]
         if max(turned) < 100:
             raise Failed(f"the wheels did not turn: {turned}")
-        self.tell(f"largest speed of the left wheel on the bus: {max(turned):.0f} mm/s")
+        self.show(f"largest speed of the left wheel on the bus: {max(turned):.0f} mm/s")
         self.ctl("why")
-        self.tell("the board decided lease, ramps and stop, not Linux. docs/user/serial.md: the same with a Nucleo")
+        self.show("the board decided lease, ramps and stop, not Linux. docs/user/serial.md: the same with a Nucleo")
 
     def end(self):
         for _, process, _ in reversed(self.processes):

@@ -37,7 +37,7 @@ class View:
         if self.drawn:
             print("\x1b[2J", end="")
 
-    def tell(self, text):
+    def show(self, text):
         print(("\x1b[K" if self.drawn else "") + f"[{time.monotonic() - self.begin:5.1f} s] {text}", flush=True)
 
     def pose(self, x_m, y_m, yaw, words):
@@ -47,7 +47,7 @@ class View:
         if not self.drawn:
             if time.monotonic() - self.told_s > 1.0:
                 self.told_s = time.monotonic()
-                self.tell(text)
+                self.show(text)
             return
         arrow = ">/^\\<,v`"[round(math.degrees(yaw) / 45) % 8]
         rows = []
@@ -66,9 +66,9 @@ class Drive:
         self.writer = peer.writer("cmd_vel", "geometry_msgs/msg/Twist")
         self.writer.await_match()
         self.x_m = self.y_m = self.yaw = 0.0
-        self.look()
+        self.poll()
 
-    def look(self, words=""):
+    def poll(self, words=""):
         message = self.odom.wait(seconds=2)
         if message is None:
             raise Failed("no odometry arrived for two seconds")
@@ -89,7 +89,7 @@ class Drive:
                 raise Failed(f"{words}: not reached after {seconds} s")
             self.writer.write(command(math.sqrt(2 * DRIFT * 0.3 * left()) + 0.05))
             due += 0.05
-            self.look(words)
+            self.poll(words)
             time.sleep(max(0, due - time.monotonic()))
 
     def side(self, number):
@@ -105,7 +105,7 @@ class Drive:
         self.until(lambda: course - self.yaw, lambda most: self.peer.twist(0, min(TURN, most)), f"corner {number + 1} of 4")
 
 
-def tell(rig, peer, view):
+def report(rig, peer, view):
     state = peer.reader("iwheel/state", "std_msgs/msg/String", transient=True)
     if state.wait(lambda message: '"gateway":"up"' in message.data, 10) is None:
         raise Failed("the bridge does not connect to the gateway")
@@ -116,12 +116,12 @@ def tell(rig, peer, view):
         answer = peer.call("iwheel/arm")
     if not (answer and answer[0]):
         raise Failed(f"iwheel/arm: {answer}")
-    view.tell(f"iwheel/arm: {answer[1]}")
+    view.show(f"iwheel/arm: {answer[1]}")
     for number in range(4):
         drive.side(number)
         drive.corner(number)
     off_m = math.hypot(drive.x_m, drive.y_m)
-    view.tell("no more commands are published: the wheels stop, because the lease ends")
+    view.show("no more commands are published: the wheels stop, because the lease ends")
     stopped = state.wait(lambda message: "lease_lost" in message.data, 3)
     if off_m > NEAR_M or stopped is None:
         raise Failed(f"{off_m:.2f} m from its starting point; stopped: {stopped}")
@@ -146,7 +146,7 @@ def main():
             file.write(f"[gateway]\nsocket = {rig.path('gateway.sock')}\n[ros]\ndomain = {domain}\nnetwork = loopback\n")
         bridge = Process([os.path.join(options.build, "app/bridge/ros2/iwheel-ros2"), "-c", rig.path("ros2.conf")], rig.path("bridge.out"))
         rig.processes.append(bridge)
-        tell(rig, Peer(domain), view)
+        report(rig, Peer(domain), view)
         print("See docs/user/ros2.md")
         return 0
     except (Failed, OSError, RuntimeError, TimeoutError) as error:

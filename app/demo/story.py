@@ -72,7 +72,7 @@ class Story:
 
     # The steps ----------------------------------------------------------------------------------------------------------
 
-    def tell(self):
+    def run(self):
         self.find_wheels()
         self.learn_offsets()
         driver = self.arm()
@@ -88,9 +88,9 @@ class Story:
         answered_ms = self.rig.start_gateway(wheels=False)
         self.client = self.rig.client("demo")
         self.client.request("watch", topics=["state"], rate_hz=20)
-        heard = self.watch(5, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"] and s["estop"]["state"] == "released")
+        online = self.watch(5, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"] and s["estop"]["state"] == "released")
         self.require(answered_ms < 3000, f"the gateway answers {answered_ms:.0f} ms after its start")
-        self.require(heard, "both wheels are online and at standstill, the e-stop is released")
+        self.require(online, "both wheels are online and at standstill, the e-stop is released")
         self.watch(1.2)
         self.require(not self.rig.bus.setpoints(), "nothing was sent to the wheels")
 
@@ -163,8 +163,8 @@ class Story:
         zero_ms = next(((t - killed_us) / 1000 for t, _, speed in setpoints if speed == 0), 9999)
         self.require(stopped and slower_ms < 100, f"the first slower setpoint was on the bus after {slower_ms:.0f} ms", f"ramp after {slower_ms:.0f} ms")
         self.require(zero_ms < 900, f"zero after {zero_ms:.0f} ms, without a jerk", f"zero after {zero_ms:.0f} ms")
-        silent = self.watch(4, lambda s: s["state"] == "listening")
-        self.require(silent and self.near(0, 0), "the wheels are at standstill, the gateway sends nothing")
+        listening = self.watch(4, lambda s: s["state"] == "listening")
+        self.require(listening and self.near(0, 0), "the wheels are at standstill, the gateway sends nothing")
         self.watch(1.0)
 
     def press(self):
@@ -183,8 +183,8 @@ class Story:
         self.require(latched and max(zeros) < 50, f"both wheels received zero {max(zeros):.1f} ms after the press", f"zero after {max(zeros):.1f} ms")
         self.watch(0.4)
         self.require("refused: latched" in driver.text() or "refused: estop_pressed" in driver.text(), "the joystick program is refused from then on")
-        stands = self.watch(3, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"])
-        self.require(stands, "the wheels are at standstill")
+        at_standstill = self.watch(3, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"])
+        self.require(at_standstill, "the wheels are at standstill")
         self.watch(1.0)
 
     def reset(self):

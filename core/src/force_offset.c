@@ -178,7 +178,7 @@ static void settle(iw_force_t *self, iw_time_us_t now_us) {
 
 static void judge_window(iw_force_t *self, iw_time_us_t now_us) {
     measure(self, &self->quality);
-    // A steady load looks like a quiet sensor; only a trusted offset reveals it.
+    // A steady load appears as a quiet sensor; only a trusted offset reveals it.
     const bool known = self->provenance == IW_OFFSET_STORED || self->provenance == IW_OFFSET_OPERATOR;
     if (self->quality.window == IW_WINDOW_GOOD && known &&
         far_from_offset(self, self->quality.mean_mN, IW_FORCE_SHIFT_mN)) {

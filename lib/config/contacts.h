@@ -7,7 +7,7 @@
 #include "config/settings.h"
 
 /// Reports relations that do not hold. `lines`: line numbers of `line2` and `estop_discrepancy_ms` in the file; 0 if
-/// not given. Two names of the same line are detected when it is opened.
+/// not set. Two names of the same line are detected when it is opened.
 void config_relate_contacts(const gateway_config_t *config, settings_report_t *report, unsigned line2_at,
                             unsigned limit_at);
 

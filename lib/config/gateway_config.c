@@ -176,7 +176,7 @@ static unsigned line_of(const char *key, const unsigned *lines) {
     return lines[settings_find(&form, NULL, key) - keys];
 }
 
-/// Returns the line of the last given key of the stop budget.
+/// Returns the line of the last key of the stop budget in the file.
 static unsigned last_line(const unsigned *lines) {
     static const char *const budget[] = {"period_ms", "lease_ms", "decel_mm_s2", "max_speed_mm_s"};
     unsigned last = 0;
@@ -206,7 +206,7 @@ static void budget_fixes(const iw_config_t *core, char *out, size_t size) {
     }
 }
 
-/// Sets the standstill values from radius and gear if they are not given.
+/// Sets the standstill values from radius and gear if they are not set.
 static void complete(void *values, const unsigned *lines) {
     iw_config_t *core = &((gateway_config_t *)values)->core;
     if (line_of("rest_rpm", lines) == 0U) {

@@ -27,7 +27,7 @@
 
 typedef enum { GATEWAY_MISMATCH_REFUSE = 0, GATEWAY_MISMATCH_WARN } gateway_mismatch_t;
 
-/// Texts are terminated, not empty, printable, and within the lengths given here.
+/// Texts are terminated, not empty, printable, and within the lengths below.
 typedef struct gateway_config {
     iw_config_t
         core; ///< [wheels] [left] [right] [drive] [limits]. `listen_only` is not a key; the command line sets it.
@@ -96,8 +96,8 @@ typedef const char *(*gateway_config_note_t)(const void *context, const char *se
 void gateway_config_print_noted(const gateway_config_t *config, gateway_config_note_t note, const void *context,
                                 FILE *out);
 
-/// Writes the whole configuration as a commented file. Loading that file gives the same configuration, and printing it
-/// again gives the same bytes (except `listen_only`, which is printed as a comment).
+/// Writes the whole configuration as a commented file. Loading that file results in the same configuration, and
+/// printing it again in the same bytes (except `listen_only`, which is printed as a comment).
 void gateway_config_print(const gateway_config_t *config, FILE *out);
 
 #endif

@@ -51,8 +51,8 @@ typedef struct {
     settings_kind_t kind;
     uint16_t offset; ///< Offset of the field in the values.
     uint16_t size;   ///< Size of the field: a number of 1, 2 or 4 bytes, or a text with its terminator.
-    uint16_t set; ///< SETTINGS_NUMBER: offset of a bool that is true once the key is given; 0 if it always has a value.
-    bool unset_is_0; ///< SETTINGS_NUMBER: 0, which is outside the range, means that the key is not given.
+    uint16_t set; ///< SETTINGS_NUMBER: offset of a bool that is true once the key is set; 0 if it always has a value.
+    bool unset_is_0; ///< SETTINGS_NUMBER: 0, which is outside the range, means that the key is not set.
     uint16_t range;  ///< SETTINGS_NUMBER: argument of the form's `range`; 0 if `min` and `max` apply.
     uint32_t min;
     uint32_t max;
@@ -91,11 +91,11 @@ typedef struct settings_form {
     const char *missing;         ///< Fix for a missing file: "create it from share/gateway.conf".
     /// Returns the range of rows that have a `range`; the pointer is NULL if there is none.
     void (*range)(uint16_t range, uint32_t *out_min, uint32_t *out_max);
-    /// Returns why this key does not exist and what to do, for keys that people look for; NULL for all others.
+    /// Returns why this key does not exist and what to do, for keys that users search; NULL for all others.
     const char *(*hint)(const char *key);
-    /// Sets values that were not given and depend on others; NULL if there are none. `lines` as below.
+    /// Sets values that are not in the file and depend on others; NULL if there are none. `lines` as below.
     void (*complete)(void *values, const unsigned *lines);
-    /// Reports values that do not fit together. `lines` has the line of every row, 0 if it was not given.
+    /// Reports values that do not fit together. `lines` has the line of every row, 0 if it is not in the file.
     void (*relate)(settings_report_t *report, const void *values, const unsigned *lines);
 } settings_form_t;
 
@@ -117,8 +117,8 @@ typedef struct {
     const void *context;
 } settings_note_t;
 
-/// Writes all values as a commented file. Loading it gives the same values, and printing it again gives the same bytes.
-/// `note` may be NULL.
+/// Writes all values as a commented file. Loading it results in the same values, and printing it again in the same
+/// bytes. `note` may be NULL.
 void settings_print(const settings_form_t *form, const void *values, const void *defaults, const settings_note_t *note,
                     FILE *out);
 

@@ -150,7 +150,7 @@ static void judge_load(const inspect_traffic_t *traffic, const inspect_config_t 
     }
 }
 
-/// Reports a controller that is bus-off: missing frames then give no information about wheels and cables.
+/// Reports a controller that is bus-off: missing frames then show nothing about wheels and cables.
 static void say_bus_off(const iwl_bus_link_t *link, const char *bus, inspect_findings_t *findings) {
     inspect_say(findings, "bus_state", INSPECT_FAIL,
                 "bus %s: bus-off: too many errors, the controller has left the bus", bus);

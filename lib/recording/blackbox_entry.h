@@ -22,7 +22,7 @@ typedef enum {
     BLACKBOX_NOT_SENT,   ///< Frame that the port refused in this step. number: id; as.value: result.
     BLACKBOX_PURGE,      ///< Purge in this step. as.value: result.
     BLACKBOX_ARM,        ///< Arm request. number: client; a: takeover; b: iw_refusal_t.
-    BLACKBOX_DRIVE,      ///< Drive request. number: client; a: currents are given; b: iw_refusal_t; as.drive.
+    BLACKBOX_DRIVE,      ///< Drive request. number: client; a: currents are present; b: iw_refusal_t; as.drive.
     BLACKBOX_STOP,       ///< Stop. number: client; a: iw_cause_t.
     BLACKBOX_ESTOPPED,   ///< Software e-stop. number: client.
     BLACKBOX_RESET,      ///< Reset request. b: iw_refusal_t.

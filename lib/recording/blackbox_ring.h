@@ -51,7 +51,7 @@ size_t blackbox_ring_most(const blackbox_ring_t *self);
 bool blackbox_ring_is_whole(const blackbox_ring_t *self);
 
 /// Copies the entries with the numbers from `from` up to but not including `to` (at most those written) to `out`, which
-/// has room for them or for blackbox_ring_most. Any process may call it. Returns the number of the first copied entry,
+/// has space for them or for blackbox_ring_most. Any process may call it. Returns the number of the first copied entry,
 /// which is larger than `from` if older ones were overwritten. `*out_count` is their number.
 uint64_t blackbox_ring_copy(const blackbox_ring_t *self, uint64_t from, uint64_t to, blackbox_entry_t *out,
                             size_t *out_count);

@@ -32,7 +32,7 @@ typedef struct {
 void candump_reader_init(candump_reader_t *self, int fd);
 
 /// Returns the next frame or bad line; skips blank lines and comments. A last line without line end may be cut, and a
-/// frame that is cut in its data looks like a shorter one, so it is reported as bad.
+/// frame that is cut in its data equals a shorter one, so it is reported as bad.
 candump_read_t candump_reader_next(candump_reader_t *self, candump_t *out_frame);
 
 #endif

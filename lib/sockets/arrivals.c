@@ -134,7 +134,7 @@ static sock_client_t *stop_place(sock_clients_t *self, sock_client_t *first, uid
     return place;
 }
 
-/// All places of the socket are taken. Reads the first line of the connection immediately, and waits for it if a place
+/// All places of the socket are in use. Reads the first line of the connection immediately, and waits for it if a place
 /// to wait in is free.
 static void receive_stop(sock_clients_t *self, const newcomer_t *newcomer, sock_right_t right, bool may_wait) {
     sock_client_t *first = &self->client[sock_parts[SOCK_STOP].first + right * SOCK_STOP_SLOTS];

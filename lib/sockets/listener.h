@@ -28,7 +28,7 @@ typedef enum {
     SOCK_WATCH,     ///< Read, stop and e-stop.
     SOCK_RIGHTS,    ///< Number of sockets, one for each right above.
     SOCK_STOP =
-        SOCK_RIGHTS, ///< Stop or e-stop, once: for a client that arrives when all places of its socket are taken.
+        SOCK_RIGHTS, ///< Stop or e-stop, once: for a client that arrives when all places of its socket are in use.
     SOCK_PARTS,
 } sock_right_t;
 

@@ -2,7 +2,7 @@
 /// One connection of the northbound socket: received bytes, and lines to send.
 ///
 /// The buffers have a fixed size. If the output buffer is full, events are lost; they are counted, and a `lost` event
-/// reports them when there is room again. Half of the buffer is reserved for replies, and a client that does not
+/// reports them when there is space again. Half of the buffer is reserved for replies, and a client that does not
 /// receive these either is dropped. No function waits.
 ///
 ///     FREE --accept--> OPEN --end of file--> ENDED
@@ -47,7 +47,7 @@ typedef struct sock_client {
     bool leaving;  ///< The peer sends nothing more and can hold no lease, but lines from before may be waiting.
     bool hung_up;  ///< The peer does not read either.
     // Reasons to wait: both may be true, because only the first one delays later lines.
-    bool held;     ///< Its next line waits: an arm is not decided, or the relay has no room.
+    bool held;     ///< Its next line waits: an arm is not decided, or the relay has no space.
     bool owed;     ///< A reply is still to come; until then the connection stays open even if it has ended.
     bool said;     ///< Beyond the maximum: its one line was executed. True until the slot is freed, in every phase.
     uint32_t lost; ///< Number of events that did not fit since the last `lost` event.
@@ -63,7 +63,7 @@ typedef struct sock_client {
     char out[SOCK_OUT_SIZE];
 } sock_client_t;
 
-/// Reads as many bytes as the buffer has room for. One system call.
+/// Reads as many bytes as fit in the buffer. One system call.
 void sock_client_read(sock_client_t *self);
 
 /// Returns the next complete line without its newline, or NULL. It is valid until `sock_client_drop_line`.

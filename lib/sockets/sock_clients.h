@@ -20,7 +20,7 @@ _Static_assert(SOCK_DRIVERS_MAX == 64U && SOCK_WATCHERS_MAX == 64U, "a word has 
 /// no client is evicted for it. Such a client is closed after its first line, for which it has SOCK_STOP_US. Each
 /// `stop`, `disarm` and `estop` that arrived with that line is executed. A user other than root holds at most half of a
 /// socket's places. If all are used, one that has sent nothing for SOCK_STOP_LEAST_US is replaced, so that a thousand
-/// idle connections per second leave room for a client that sends a stop shortly after connecting.
+/// idle connections per second leave places for a client that sends a stop shortly after connecting.
 #define SOCK_STOP_PLACES   8U ///< Per socket.
 #define SOCK_STOP_US       200000U
 #define SOCK_STOP_LEAST_US 5000U

@@ -197,8 +197,8 @@ void sock_service_clients(sock_clients_t *self, iw_client_t holder) {
     sock_service_poll_arrivals(self);
 }
 
-/// Watches for input unless there is no room or no use (a watcher whose next line must wait does not wake the loop with
-/// more), and for output only while something is queued.
+/// Watches for input unless there is no space or no use (a watcher whose next line must wait does not wake the loop
+/// with more), and for output only while something is queued.
 static void update_interest(sock_clients_t *self, sock_client_t *client) {
     const bool reading = client->phase == SOCK_OPEN && client->in_length < sizeof client->in &&
                          (client->right != SOCK_WATCH || !has_line(client));

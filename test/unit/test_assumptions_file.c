@@ -171,11 +171,11 @@ TEST(test_assumptions_file_other_bus_version_or_format_is_refused) {
     forge("{\"format\":\"iwheel-ledger\",\"version\":2,\"bus\":\"can0\",\"items\":{},\"offsets\":{}}\n");
     refused("another version");
     forge("{\"format\":\"something\",\"version\":1}\n");
-    refused("not the ledger");
+    refused("not the assumption store");
     forge("not even JSON\n");
-    refused("not the ledger");
+    refused("not the assumption store");
     forge("[1,2,3]\n");
-    refused("not the ledger");
+    refused("not the assumption store");
     forge("");
     refused("damaged");
 }

@@ -26,8 +26,8 @@ typedef enum { TABLE, HISTORY, RECORDINGS, RECORDING, VERBS } verb_t;
 typedef struct {
     verb_t verb;
     const char *path; ///< Path of the configuration; NULL: not named.
-    bool until;       ///< --until is given.
-    unsigned used;    ///< Verbs in which all options that were given are allowed.
+    bool until;       ///< --until is present.
+    unsigned used;    ///< Verbs in which all present options are allowed.
     fleet_wanted_t wanted;
 } words_t;
 

@@ -300,8 +300,8 @@ int mqtt_bridge_open(mqtt_bridge_t *self, const mqtt_settings_t *settings) {
     const mqtt_broker_listener_t broker = {
         "iwheel-mqtt", self->name,  self->topics,     self->will,          self,
         broker_up,     broker_down, mqtt_events_sent, mqtt_events_refused, mqtt_bridge_command};
-    // A client that knows the id of the machine cannot guess the random part of the name, so it cannot take the name at
-    // a broker and keep the bridge away.
+    // A client that knows the id of the machine cannot guess the random part of the name, so it cannot use the name at
+    // a broker and lock the bridge out.
     const bool random = make_boot(self->boot);
     (void)snprintf(self->name, sizeof self->name, "iwheel-%s-%s", settings->machine.id, self->boot);
     mqtt_topic(settings->machine.id, "availability", NULL, self->will);

@@ -79,7 +79,7 @@ static void forget_at(mqtt_spool_t *self, size_t at) {
     self->begin += length;
 }
 
-/// Returns room for this number of bytes after the newest record; drops the oldest ones if necessary. `length` is at
+/// Returns space for this number of bytes after the newest record; drops the oldest ones if necessary. `length` is at
 /// most the whole size.
 static uint8_t *make_room(mqtt_spool_t *self, size_t length) {
     while (self->end - self->begin + length > self->size) {

@@ -10,8 +10,8 @@
 ///
 ///     UNKNOWN --samples span ROS_LEARN_US on both clocks, equal within 10 %--> KNOWN --gap > ROS_GAP_US--> UNKNOWN
 ///
-/// The span begins again with each sample that took clearly less time than the first one: a burst of samples that the
-/// network held back is no measure of the clock. A sample of a KNOWN writer may take ROS_LATE_US longer than the
+/// The span begins again with each sample that needed clearly less time than the first one: a burst of samples that the
+/// network held back is no measure of the clock. A sample of a KNOWN writer may need ROS_LATE_US longer than the
 /// fastest sample of this writer. That measure rises by ROS_DRIFT_PPM, because two clocks never run at the same rate.
 /// If all samples of a writer are late by the same time, the bridge cannot distinguish that from a wrong clock.
 #ifndef ROS2_AGES_H

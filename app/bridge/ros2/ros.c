@@ -195,7 +195,7 @@ static bool keep_local(ros_t *self, FILE *err) {
     if (self->domain > 0 && !bridge_reach_bind_lo()) {
         (void)fprintf(
             err,
-            "iwheel-ros2: cannot keep the DDS sockets on this machine: %s; it needs Linux 5.7 and the interface "
+            "iwheel-ros2: cannot limit the DDS sockets to this machine: %s; it needs Linux 5.7 and the interface "
             "lo up, or set [ros] network = default\n",
             strerror(errno));
         return false;

@@ -235,7 +235,7 @@ static void take_reply(relay_t *self, relay_channel_t *channel, sock_client_t *c
     bool ok;
     if (!read_reply(&at, end, &number, &ok) ||
         !serial_queue_take(&channel->queue, number, ok, at, (size_t)(end - at))) {
-        return; // The request was given up, and its client informed.
+        return; // The request timed out, and its client was informed.
     }
     if (number == channel->arm_number) {
         channel->armed_us = self->now_us;

@@ -20,7 +20,7 @@ size_t relay_write_numbered(iwn_json_t root, uint64_t number, char *out, size_t 
     return (text.length + 1U < size) ? text.length : 0U;
 }
 
-/// Returns the open channel with the fewest requests; NULL if none has room.
+/// Returns the open channel with the fewest requests; NULL if none has space.
 static relay_channel_t *quietest_channel(relay_t *self) {
     relay_channel_t *found = NULL;
     for (unsigned i = 1; i <= IWN_LINE_CHANNELS; i++) {

@@ -168,7 +168,7 @@ static void write_port(relay_t *self) {
         }
         self->out_sent += (size_t)count;
         if (self->out_sent < self->out_length) {
-            break; // The buffer is full; room in it wakes the loop.
+            break; // The buffer is full; free space in it wakes the loop.
         }
         self->out_length = 0;
     }
@@ -355,7 +355,7 @@ static void compose(relay_t *self, const serial_settings_t *settings) {
     self->log.program = "iwheel-serial";
 }
 
-/// Opens the port first: a relay that cannot have the port must not take the sockets. A port that does not exist yet is
+/// Opens the port first: a relay that cannot open the port must not bind the sockets. A port that does not exist yet is
 /// awaited.
 static int open_all(relay_t *self) {
     int result = open_loop(self);

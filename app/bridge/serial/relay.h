@@ -8,7 +8,7 @@
 ///   last time at which nothing of that client was waiting. The quote never changes later.
 /// - If the loop was delayed for longer than RELAY_GAP_US (stopped, starved, suspended), waiting requests that could
 ///   lead to motion are refused. After RELAY_LEFT_US every client is closed, because the board has closed the channels.
-/// - A command is sent only if the line has room for it immediately (serial_queue.h).
+/// - A command is sent only if the line has space for it immediately (serial_queue.h).
 ///
 ///     port: CLOSED --opens--> ASKING (link, every RELAY_ASK_US) --event link--> LINKED: clients are served
 ///                ^------------- goes, or cannot be written to -----'

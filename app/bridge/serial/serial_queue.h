@@ -2,7 +2,7 @@
 /// Queue of the requests of one client that have no reply yet: ordered, bounded, and never executed late.
 ///
 ///     WAITING --next--> SENT --answer--> HELD ---------.
-///        |                 '--no answer in time--> ANSWERED --oldest of all: told--> gone
+///        |                 '--no answer in time--> ANSWERED --oldest of all: sent--> gone
 ///        '--replaced, overtaken by a stop, too old--> ANSWERED
 ///
 /// - One request of a client is on the line at a time. A newer `drive` replaces one that waits, so that there is at
@@ -24,11 +24,11 @@
 #define SERIAL_QUEUE_SIZE 4U
 /// A command to move that waited for this time is no longer sent: half a lease.
 #define SERIAL_FRESH_US 100000U
-/// The same for requests that permit motion, and for a stop that found no room.
+/// The same for requests that permit motion, and for a stop that found no space.
 #define SERIAL_GRANT_US 1000000U
 /// Interval at which a stop is repeated.
 #define SERIAL_AGAIN_US 150000U
-/// After this time the board has lost a request, or the relay its answer: `arm` may take `echo_ms`.
+/// After this time the board has lost a request, or the relay its answer: `arm` may need `echo_ms`.
 #define SERIAL_PATIENCE_US      3000000U
 #define SERIAL_MOVE_PATIENCE_US 1000000U ///< The same for a `drive`.
 /// Size of a request on the line, without channel and CRC.

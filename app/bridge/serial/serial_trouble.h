@@ -17,7 +17,7 @@
 #define SERIAL_TROUBLE_AGAIN_US  600000000U
 #define SERIAL_TROUBLE_BURST     8U
 #define SERIAL_TROUBLE_REFILL_US 300000000U
-/// A device that pauses for less than this time keeps its reason.
+/// A device that pauses for less than this time retains its reason.
 #define SERIAL_TROUBLE_PAUSE_US 10000000U
 
 typedef enum {

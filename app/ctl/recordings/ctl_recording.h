@@ -23,7 +23,7 @@ typedef struct {
     const char *name;     ///< Name in messages.
     const char *only;     ///< Read only this interface (option --interface); NULL: the only one.
     bool every_interface; ///< Read all interfaces. Set it before the first frame, as the next.
-    bool even;            ///< Remove the steps of a clock that was set; frames keep their order.
+    bool even;            ///< Remove the steps of a clock that was set; the order of frames stays.
     bool refused;         ///< Another format, or several interfaces: the cause and the fix were printed.
     uint64_t frames;
     uint64_t bad;

@@ -215,7 +215,7 @@ static const char *read_line(const char *text, size_t length, const char *bus, g
     iwn_json_t root;
     int64_t version;
     if (!iwn_json_check(text, length, &work, &root, &unused) || !is_text(root, "format", FORMAT)) {
-        return "it is not the ledger of an iWheel gateway";
+        return "it is not the assumption store of an iWheel gateway";
     }
     if (!read_number(root, "version", VERSION, VERSION, &version)) {
         return "another version of the gateway wrote it";

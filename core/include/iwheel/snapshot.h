@@ -63,7 +63,7 @@ typedef struct {
     uint32_t stopped;            ///< Frames that the envelope stopped. A nonzero value is an error of the core.
     uint32_t stray_echoes;       ///< Echoes that matched no unconfirmed setpoint.
     iw_time_us_t pose_us;        ///< Reception time of the last pose; IW_NEVER if there is none.
-    iw_time_us_t armed_us;       ///< Time at which ARMED began or the lease was taken over.
+    iw_time_us_t armed_us;       ///< Time at which ARMED began or the lease moved.
     iw_time_us_t lease_until_us; ///< In ARMED: end of the lease, unless another drive command arrives.
     iw_time_us_t stale_us;   ///< Last nonzero drive command of any client, accepted or not; IW_NEVER if there is none.
     iw_time_us_t waiting_us; ///< Time of the oldest setpoint without TX confirmation; IW_NEVER if there is none.

@@ -101,7 +101,7 @@ static iwc_result_t await_answer(iwc_t *self, int64_t deadline_us) {
         if (result == IWC_TIMEOUT) {
             result = iwc_await(self, POLLIN, deadline_us);
         } else if (result == IWC_OK && iwc_now_us() >= deadline_us) {
-            result = IWC_TIMEOUT; // Events keep coming, but not the reply.
+            result = IWC_TIMEOUT; // Events continue to arrive, but not the reply.
         }
         if (result != IWC_OK) {
             return result;

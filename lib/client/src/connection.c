@@ -326,7 +326,7 @@ iwc_result_t iwc_next(iwc_t *self, int timeout_ms, iwc_message_t *out_message) {
         if (result == IWC_TIMEOUT && timeout_ms != 0) {
             result = iwc_await(self, POLLIN, deadline_us);
         } else if (result == IWC_OK && iwc_now_us() >= deadline_us && !iwc_pending(self)) {
-            result = IWC_TIMEOUT; // Data keeps coming, but no message for the caller.
+            result = IWC_TIMEOUT; // Data continues to arrive, but no message for the caller.
         }
         if (result != IWC_OK) {
             return result;

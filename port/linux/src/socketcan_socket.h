@@ -97,7 +97,7 @@ int iwl_socketcan_socket_drop(iwl_socketcan_socket_t *self);
 int iwl_socketcan_socket_fill(iwl_socketcan_socket_t *self);
 
 /// Implements `send` of iw_hal_t: all frames in one system call. No signal ends that call between two frames, not even
-/// SIGKILL. The kernel may run another process between them, its queue may have room for one frame only, and it drops
+/// SIGKILL. The kernel may run another process between them, its queue may have space for one frame only, and it drops
 /// the error of the second frame, which the next call reports.
 int iwl_socketcan_socket_send(const iwl_socketcan_socket_t *self, const iw_can_frame_t *frames, uint32_t count);
 

@@ -95,7 +95,7 @@ typedef struct {
     uint32_t raised;             ///< Bit mask of causes that were raised since the last step.
     uint32_t present;            ///< Bit mask of causes that were raised in the step before.
     uint32_t still_moving;       ///< Number of holds that ended after `hold_max_s` while a wheel still turned.
-    iw_time_us_t armed_us;       ///< Time at which ARMED began or the lease was taken over: older commands are stale.
+    iw_time_us_t armed_us;       ///< Time at which ARMED began or the lease moved: older commands are stale.
     iw_time_us_t lease_from_us;  ///< Time of the last accepted drive command, or of arm.
     iw_time_us_t lease_until_us; ///< End of the lease, unless another drive command arrives.
     iw_time_us_t arming_us;      ///< Time at which ARMING or REARMING began.

@@ -21,7 +21,7 @@ static bool fail(check_t *self, const char *what) {
 
 // Objects and lists -------------------------------------------------------------------------------------------------
 
-/// Compares two names, given by the position behind their opening quotes, with escapes decoded. Returns a number below
+/// Compares two names, at the positions behind their opening quotes, with escapes decoded. Returns a number below
 /// 0, 0 or above 0.
 static int compare_names(const char *one, const char *other) {
     uint32_t a;

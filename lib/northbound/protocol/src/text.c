@@ -118,7 +118,7 @@ void iwn_plain_copy(const char *text, char *out, size_t size) {
 
 /// Writes the form in JSON.
 static size_t escape(uint32_t code_point, char out_escape[ESCAPE_SIZE]) {
-    if (code_point < 0x20U) { // Such a character stands between values only.
+    if (code_point < 0x20U) { // Such a character occurs between values only.
         out_escape[0] = ' ';
         return 1;
     }

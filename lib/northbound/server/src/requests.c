@@ -111,7 +111,7 @@ static void do_estop(iwn_server_t *self, iwn_client_t *client) {
     if (!latched) {
         memcpy(self->estop_reason, self->request.reason, sizeof self->estop_reason);
     }
-    // Already in effect: repeated requests cost neither a step nor room in the recorder.
+    // Already in effect: repeated requests cost neither a step nor space in the recorder.
     if (!latched || self->now_us - seen->seen_us[IW_CAUSE_ESTOP_SOFTWARE] >= IWN_ESTOP_AGAIN_US) {
         iw_gateway_estop(self->core, self->now_us, client->id);
         iwn_target_judged(self, client, IW_REFUSE_NONE);

@@ -118,7 +118,7 @@ bool Drive::deactivate()
   return (result == IWC_OK) || fail(std::string("stop: ") + iwc_words(result));
 }
 
-bool Drive::take(const iwc_message_t & message)
+bool Drive::receive(const iwc_message_t & message)
 {
   char text[256] = "";
   if (!message.is_event) {
@@ -163,7 +163,7 @@ bool Drive::read(std::array<Wheel, SIDES> & out_wheels)
   iwc_result_t result = iwc_latest(gateway_);
   if (result == IWC_OK) {
     for (result = iwc_next(gateway_, 0, &message); result == IWC_OK; result = iwc_next(gateway_, 0, &message)) {
-      if (!take(message)) {
+      if (!receive(message)) {
         return false;
       }
     }

@@ -77,22 +77,22 @@ typedef struct {
     int64_t offset;                         ///< recording: in bytes; may be negative.
     int64_t t_us;                           ///< arm, reset, release and confirm, with `has_t_us`: time of the request.
     int64_t stop;                           ///< reset, with `has_stop`: number of the stop to reset.
-    bool has_t_us;                          ///< `t_us` is given.
-    bool has_stop;                          ///< `stop` is given.
-    bool has_current;                       ///< Both currents are given.
+    bool has_t_us;                          ///< `t_us` is present.
+    bool has_stop;                          ///< `stop` is present.
+    bool has_current;                       ///< Both currents are present.
     bool takeover;                          ///< arm.
-    bool has_commit;                        ///< config: `commit` is given.
+    bool has_commit;                        ///< config: `commit` is present.
     bool commit;                            ///< config, with `has_commit`.
     uint8_t topics;                         ///< watch: bit mask of iwn_topic_t.
     uint8_t sides;                          ///< tare: IW_SIDES_...
     iw_assumption_item_t item;              ///< confirm.
-    char value[IWN_VALUE_SIZE];             ///< confirm and config, a number as decimal digits; empty if not given.
-    char how[IWN_HOW_SIZE];                 ///< confirm; empty if not given.
-    char name[IWN_NAME_MAX + 1U];           ///< Empty if not given.
-    char reason[IWN_REASON_MAX + 1U];       ///< Empty if not given.
+    char value[IWN_VALUE_SIZE];             ///< confirm and config, a number as decimal digits; empty if absent.
+    char how[IWN_HOW_SIZE];                 ///< confirm; empty if absent.
+    char name[IWN_NAME_MAX + 1U];           ///< Empty if absent.
+    char reason[IWN_REASON_MAX + 1U];       ///< Empty if absent.
     char file[IWN_FILE_MAX + 1U];           ///< recording: name of the file.
-    char key[IWN_KEY_MAX + 1U];             ///< config; empty if not given.
-    char lease_key[IWN_LEASE_KEY_MAX + 1U]; ///< drive and twist; empty if not given.
+    char key[IWN_KEY_MAX + 1U];             ///< config; empty if absent.
+    char lease_key[IWN_LEASE_KEY_MAX + 1U]; ///< drive and twist; empty if absent.
 } iwn_request_t;
 
 /// Reason of a refusal: its name, and a message with cause and fix.

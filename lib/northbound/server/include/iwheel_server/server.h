@@ -66,7 +66,7 @@ typedef struct iwn_server {
     uint32_t max_age_ms; ///< Largest age of arm, reset, release and confirm.
     uint32_t rate_max_hz;
     uint8_t topics; ///< Bit mask of the topics that can be watched here (iwn_topic_t).
-    /// True: each client has its own times for periodic events, for a line that cannot carry many at once. False: all
+    /// True: each client has its own times for periodic events, for a line that cannot carry many together. False: all
     /// clients share a grid, so that an event is written once for many.
     bool each_for_itself;
 

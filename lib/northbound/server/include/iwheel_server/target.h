@@ -18,7 +18,7 @@ char *iwn_target_line(iwn_server_t *self, size_t *out_size);
 /// Sends the line in the buffer, with its newline. `length` 0: the line did not fit.
 void iwn_target_reply(iwn_server_t *self, iwn_client_t *client, char *line, size_t length);
 
-/// Sends an event in the same way. A client without room loses it.
+/// Sends an event in the same way. A client without space loses it.
 void iwn_target_event(iwn_server_t *self, iwn_client_t *client, char *line, size_t length);
 
 /// Answers `self->request`, which is `status`; iwn_server_write_status writes the fields.

@@ -44,7 +44,7 @@ public:
   // Stops the wheels if this object holds the lease, and closes the connection.
   void close();
 
-  // Requests the lease under this name; never takes it over. Waits up to half a second.
+  // Requests the lease under this name; never moves the lease of another client. Waits up to half a second.
   bool activate(const std::string & name);
 
   // Stops with the ramp. Returns false after closing the connection if the gateway did not reply.
@@ -65,7 +65,7 @@ public:
 
 private:
   bool fail(const std::string & why);
-  bool take(const iwc_message_t & message);
+  bool receive(const iwc_message_t & message);
   bool read_radius();
   bool judge_active();
 
