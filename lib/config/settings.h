@@ -32,7 +32,7 @@ typedef enum {
     SETTINGS_WORD,   ///< One of `words`.
     SETTINGS_MODE,   ///< Octal permission bits, always with read and write of the owner.
     SETTINGS_TEXT,   ///< Printable, without `;`, not empty, no longer than the field; `wrong` may check more.
-    SETTINGS_OWN,    ///< By `parse` and `format`.
+    SETTINGS_OWN,    ///< Read and written by `parse` and `format`.
 } settings_kind_t;
 
 typedef struct {

@@ -57,8 +57,8 @@ typedef struct {
     int64_t wall_off_us;       ///< Offset of the wall clock.
     iw_time_us_t end_us;       ///< The life ends there as VK_OVER.
     uint64_t calls;            ///< Calls of all lives.
-    uint64_t waits;            ///< Of these, waits of the loop.
-    uint64_t failed;           ///< Of these, made to fail.
+    uint64_t waits;            ///< Waits of the loop, contained in `calls`.
+    uint64_t failed;           ///< Calls that the test made fail, contained in `calls`.
     uint64_t kill_at;          ///< The process dies in the call with this number; 0: in none.
     bool kill_after;           ///< After it has taken effect.
     bool doomed;               ///< It dies before it does anything else.

@@ -59,7 +59,7 @@ class Fault(NamedTuple):
 
 class Applied(NamedTuple):
     file: str  # Relative to the tree.
-    text: str  # Of the whole file, with the fault.
+    text: str  # Contents of the whole file, with the fault.
     moved: str  # Empty, or the missing function and the file that now has its code.
 
 

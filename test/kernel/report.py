@@ -79,7 +79,7 @@ A test in real time is not judged and not counted if the machine stalled during 
 which runs alone.
 """
 NATIVE = """
-## What is not covered
+## Limits
 
 **The machine's own kernel.** `test/kernel/run --native` runs the tests in real time on the machine's own kernel, with
 the modules vcan, slcan and gpio-sim. It has not been run on such a machine, because none was available. It has been run
@@ -183,7 +183,7 @@ def run_text(outcomes, options):
         text += f"\n{word}: {', '.join(tests)}." if tests else ""
     if not options.full:
         text += "\nNot run for this page: `--full`, with a soak of 24 virtual hours and 1000 presses."
-    return "\n## What was run\n\n" + text + "\n" + row_text(outcomes)
+    return "\n## Tests of this run\n\n" + text + "\n" + row_text(outcomes)
 
 
 def row_text(outcomes):

@@ -323,7 +323,7 @@ class Running(unittest.TestCase):
         with iwheel.Gateway(rig.path("gateway.sock"), wait=10) as gateway:
             wheels = gateway.arm("client that goes on")
             wheels.drive_for(0.6, 300, 300)
-            rig.gateway.signal(signal.SIGTERM)  # What the package manager does ...
+            rig.gateway.signal(signal.SIGTERM)  # As the package manager does ...
             stopped_us = now_us()
             with self.assertRaises(iwheel.IWheelError):
                 wheels.drive_for(5, 300, 300)

@@ -83,17 +83,17 @@ void my_watchdog_feed(void) {
     feeds++;
 }
 
-int32_t my_wish_left(void) {
+int32_t my_speed_left(void) {
     return 120;
 }
 
-int32_t my_wish_right(void) {
+int32_t my_speed_right(void) {
     return -80;
 }
 
 /// The switch: on when both wheels are known, on for another 5 s after the loop was held up, off for half a second, and
 /// on again.
-bool my_wish_to_arm(void) {
+bool my_arm_request(void) {
     const iw_time_us_t for_us = time_us - phase_us;
     return (phase == FIRST_DRIVE) ? for_us > 1000000U : (phase == HELD_UP || for_us > 500000U);
 }
@@ -123,7 +123,7 @@ static void send_telemetry(void) {
     telemetry_us += 4000U;
 }
 
-static bool is_told_wish(void) {
+static bool is_commanded(void) {
     return commanded_mm_s[IW_LEFT] == 120 && commanded_mm_s[IW_RIGHT] == -80;
 }
 
@@ -144,7 +144,7 @@ static bool follow_phases(void) {
         }
         return false;
     }
-    if (is_told_wish() && feeds > 100U) {
+    if (is_commanded() && feeds > 100U) {
         if (phase == SECOND_DRIVE) {
             exit(0);
         }

@@ -61,10 +61,9 @@ TEST(test_recording_last_piece_has_both_checksums) {
 }
 
 TEST(test_recording_second_piece_continues_the_checksum) {
-    TEST_ASSERT_EQUAL(
-        IWC_OK,
-        ask(4, 0x9BE3E0A3U,
-            "\"offset\":4,\"size\":9,\"data\":\"NTY3ODk=\",\"crc32\":320708720,\"file_crc32\":3421780262")); // Of 1234
+    TEST_ASSERT_EQUAL(IWC_OK, ask(4, 0x9BE3E0A3U,
+                                  "\"offset\":4,\"size\":9,\"data\":\"NTY3ODk=\",\"crc32\":320708720,\"file_crc32\":"
+                                  "3421780262")); // crc32 of 1234
     TEST_ASSERT_EQUAL(5, piece.length);
     TEST_ASSERT_EQUAL_HEX32(0xCBF43926U, piece.crc32);
 }

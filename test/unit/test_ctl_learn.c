@@ -413,7 +413,7 @@ TEST(test_learn_lag_of_differing_changes_has_no_value) {
 TEST(test_learn_lag_requires_steady_speed_before_and_after) {
     model_t wheel = {.lag_ms = 60.0};
     follow(&wheel, 900, 0);
-    follow(&wheel, 2500, 600); // Of 0.9 s the speed was steady for 0.4 s.
+    follow(&wheel, 2500, 600); // The speed was steady for 0.4 s of 0.9 s.
     TEST_ASSERT_EQUAL_UINT32(0, drives.lag[IW_LEFT].count);
     follow(&wheel, 2500, 400);
     TEST_ASSERT_EQUAL_UINT32(0, drives.lag[IW_LEFT].count);

@@ -120,7 +120,7 @@ TEST(test_gateway_suspended_below_100_ms_continues_to_drive) {
         gateway_rig_init(&rig);
         gateway_rig_arm(&rig);
         (void)gateway_rig_cruise(&rig, 300, 300, MS(500));
-        TEST_ASSERT_TRUE(rig.now_us < rig.wake_us); // By the clock the step is not late.
+        TEST_ASSERT_TRUE(rig.now_us < rig.wake_us); // The step is not late by the clock.
         iw_gateway_suspended(&rig.gateway, cases[i].for_us);
         gateway_rig_step(&rig);
         TEST_ASSERT_EQUAL_UINT32(cases[i].late_steps, rig.gateway.counters.late_steps);

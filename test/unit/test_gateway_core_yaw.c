@@ -36,7 +36,7 @@ TEST(test_gateway_turn_is_limited_first_by_yaw_then_by_speed) {
     assert_applied(-270, 270, true, &applied);
     applied = ask(0, 1000);
     assert_applied(0, 540, true, &applied);
-    applied = ask(3000, 4000); // By yaw 1620 and 2160, then by speed
+    applied = ask(3000, 4000); // Yaw limits it to 1620 and 2160, then speed
     assert_applied(750, 1000, true, &applied);
     applied = ask(2000, 2000);
     assert_applied(1000, 1000, true, &applied);

@@ -480,7 +480,7 @@ TEST(test_lock_of_simultaneous_starts_is_acquired_by_one) {
     }
     remove_top();
     TEST_ASSERT_EQUAL_INT(0, mkdir(top, 0755));
-    spoil_shared(); // By name only
+    spoil_shared(); // Found only by its name
     for (int round = 0; round < 3; round++) {
         TEST_ASSERT_EQUAL_INT(1, how_many_run());
     }

@@ -24,7 +24,7 @@ typedef struct {
 
 extern sim_pair_config_t config;
 extern sim_pair_t pair;
-extern seen_t seen[2048]; ///< By id.
+extern seen_t seen[2048]; ///< Indexed by id.
 
 /// Starts a default pair that boots at START_US, without a driver.
 void rig_init(void);

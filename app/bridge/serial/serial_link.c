@@ -22,7 +22,7 @@ static serial_stamp_t *newest(serial_link_t *self) {
     return &self->stamp[(self->stamps - 1U) % SERIAL_STAMPS];
 }
 
-/// Of stamps that arrive close together, stores the newest one only when another is far enough away, so that the ring
+/// Stores the newest of the stamps that arrive close together only when another is far enough away, so that the ring
 /// covers more time.
 static void note_stamp(serial_link_t *self, uint64_t t_us, uint64_t now_us) {
     const bool close =

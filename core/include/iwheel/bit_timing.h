@@ -39,8 +39,8 @@ typedef struct {
     uint16_t sample_point_permille; ///< Rounded to the nearest.
 } iw_bit_timing_achieved_t;
 
-/// Finds the bit timing with exactly the wanted bit rate and the nearest sample point. Of equally good ones it returns
-/// the one with the most quanta, then the one that samples later. Returns IW_ERR_RANGE and leaves `*out_timing`
+/// Finds the bit timing with exactly the wanted bit rate and the nearest sample point. Among equally good ones it
+/// returns the one with the most quanta, then the one that samples later. Returns IW_ERR_RANGE and leaves `*out_timing`
 /// unchanged if there is none or an argument is 0. The caller checks the sample point with `iw_bit_timing_achieved`.
 iw_status_t iw_bit_timing_solve(const iw_bit_timing_limits_t *limits, uint32_t clock_hz,
                                 const iw_bit_timing_achieved_t *wanted, iw_bit_timing_t *out_timing);

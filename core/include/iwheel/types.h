@@ -43,7 +43,7 @@ typedef struct {
 
 /// Commands for both wheels, indexed by `iw_side_t`. The core sends both or neither.
 typedef struct {
-    iw_command_t wheel[IW_SIDES]; ///< By side.
+    iw_command_t wheel[IW_SIDES]; ///< Commands, indexed by side.
 } iw_pair_t;
 
 /// Counters of sent frames since the start.

@@ -209,16 +209,16 @@ class LedgerEntry(TypedDict):
     state: LedgerState
     evidence: Evidence
     figure: int | None
-    """measured value; only for evidence from the bus"""
+    """measured value; only for an observation of the bus"""
     value: str | None
     """value in force"""
     found: str | None
-    """value that the operator found, if given"""
+    """value that the operator found, if present"""
     how: str | None
-    """method of the operator, if given"""
+    """method of the operator, if present"""
     since_wall_us: int | None
     reason: str
-    """the evidence as a text"""
+    """the observation as a text"""
     disabled: str | None
     """functions that a contradiction disables, and the fix"""
 

@@ -252,8 +252,8 @@ static int32_t read_exponent(const char *c, const char *end) {
 }
 
 /// Returns true if the digits from `c` on, of which the first is not zero, are beyond the range of a double: from
-/// halfway between the largest double and the next power of two. Of the 309 digits of that limit it compares the first
-/// 24, which is precise enough.
+/// halfway between the largest double and the next power of two. It compares the first 24 of the 309 digits of that
+/// limit, which is precise enough.
 static bool is_beyond(const char *c, const char *end) {
     static const char limit[] = "179769313486231580793728";
     for (const char *wanted = limit; *wanted != '\0'; wanted++) {

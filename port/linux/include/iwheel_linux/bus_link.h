@@ -11,7 +11,7 @@
 
 /// Presence of the interface.
 typedef enum {
-    IWL_LINK_LOCAL = 0, ///< Not an interface of the kernel. Of the fields below only `echo_proven` is valid.
+    IWL_LINK_LOCAL = 0, ///< Not an interface of the kernel. Only `echo_proven` of the fields below is valid.
     IWL_LINK_ABSENT,    ///< No interface has this name.
     IWL_LINK_NOT_CAN,   ///< The interface with this name is not a CAN interface.
     IWL_LINK_DOWN,
