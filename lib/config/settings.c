@@ -252,7 +252,7 @@ static int take_value(void *context, const char *section, const char *key, const
     }
     unsigned *line = &loader->lines[row - loader->form->keys];
     if (*line != 0) {
-        settings_complain(loader->report, loader->line, "%s is given a second time (first on line %u); delete one", key,
+        settings_complain(loader->report, loader->line, "%s is set a second time (first on line %u); delete one", key,
                           *line);
         return 1;
     }
@@ -311,7 +311,7 @@ int settings_load(const settings_form_t *form, const char *path, void *values, F
     if (file < 0) {
         const int error = errno;
         if (error == EACCES) {
-            settings_complain(&report, 0, "cannot be opened (%s); give %s's user the right to read it", strerror(error),
+            settings_complain(&report, 0, "cannot be opened (%s); allow %s's user to read it", strerror(error),
                               form->program);
         } else {
             settings_complain(&report, 0, "cannot be opened (%s); %s", strerror(error), form->missing);

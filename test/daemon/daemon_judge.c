@@ -16,7 +16,7 @@
 #define GAP_US      (100U * MS)
 #define RESTART_US  (100U * MS) ///< Time from the start of the process to the zeros.
 #define START_US    (5U * MS)   ///< Longer than the calls of a start.
-#define HOLD_MAX_US (63U * S)   ///< Ramp, a minute of zeros for wheels that keep turning, and a margin.
+#define HOLD_MAX_US (63U * S)   ///< Ramp, a minute of zeros for wheels that continue to turn, and a margin.
 #define CALM_US     (300U * MS) ///< Time after a fault of the bus in which gaps are not judged.
 #define WATCHDOG_US S           ///< Watchdog of the wheels.
 #define WANTED      3U          ///< Number of last commands that setpoints may still follow.
@@ -207,7 +207,7 @@ static void judge_marker(void) {
     }
 }
 
-/// The right that this client's commands give, and the end that limits it.
+/// Right to drive from this client's commands, and the end that limits it.
 static right_t right_of(unsigned client, const char **out_why) {
     const iw_time_us_t lease_us = ((iw_time_us_t)self.config->lease_ms + self.config->period_ms) * MS + LATE_US;
     if (self.drive_us[client] == IW_NEVER) {
@@ -240,7 +240,7 @@ static bool is_wanted(unsigned client, unsigned side, int32_t speed) {
 
 /// Slower is allowed during a ramp; as fast as before or faster only by a command of a client that may drive.
 static void judge_right(unsigned side, int32_t speed) {
-    // Both wheels ramp together: by rounding, the slower one may keep its speed for a pair.
+    // Both wheels ramp together: by rounding, the slower one may have the same speed for two pairs.
     const int32_t before = abs(self.side[side].speed);
     const bool falls = abs(speed) < before || (abs(speed) == before && before < abs(self.side[1U - side].speed));
     const char *why = "no client drives";

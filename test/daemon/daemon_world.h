@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 /// Everything outside the gateway's process: bus and wheels (the simulator's model), button, clients, service manager, and their
-/// faults. One scenario at a time, drawn from a seed; the same seed gives the same run, to the microsecond.
+/// faults. One scenario at a time, drawn from a seed; the same seed leads to the same run, to the microsecond.
 ///
 /// Chaos comes first; then all faults end, a well-behaved client must be able to drive, and the wheels come to standstill after it has gone.
 #ifndef DAEMON_WORLD_H
@@ -51,7 +51,7 @@ typedef struct {
     iw_time_us_t chaos_us;
     uint32_t restart_us; ///< Restart delay of the service manager.
     bool watchdog;       ///< The service manager kills a process that does not report for a second that it is alive.
-    bool may_restart;    ///< The gateway has the right to take the link down.
+    bool may_restart;    ///< The gateway has the right to set the link down.
     bool kills;          ///< Only kills happen, one in a call of each life: see world_kill_phases.
     uint32_t kill_lives; ///< Number of these lives.
     size_t count;

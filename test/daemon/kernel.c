@@ -441,7 +441,7 @@ static bool is_child_of_pair(void) {
     return false;
 }
 
-/// The process that purges: it takes the link down and up, if it may.
+/// The process that purges: it sets the link down and up, if it may.
 static void begin_purge(pid_t pid) {
     vk.link.child = pid;
     vk.link.child_status = vk.link.may_restart ? 0 : EPERM;

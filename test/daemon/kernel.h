@@ -2,7 +2,7 @@
 /// The Linux kernel for the gateway's process, in virtual time: descriptors, files, sockets, a CAN interface, a GPIO line.
 ///
 /// The linker leads every system call of the gateway here (`--wrap`, list in CMakeLists.txt); its own objects run unchanged, including
-/// `main`. One process lives at a time. All that it does takes virtual time only here, in a call, so calls are the only instants
+/// `main`. One process lives at a time. Its actions consume virtual time only here, in a call, so calls are the only instants
 /// at which two runs can differ from outside. In each call
 ///
 /// - time passes, the outside world goes on (daemon_world.h), and the process may be stopped, or preempted
@@ -10,7 +10,7 @@
 /// - the call may fail, with an errno that its manual page names
 ///
 /// Child processes do not run; their outside effects are simulated (the store process finds no file and writes none, the black box's
-/// writer accepts its orders, the purging process takes the link down and up). There is one kernel, because libc has no context.
+/// writer accepts its orders, the purging process sets the link down and up). There is one kernel, because libc has no context.
 #ifndef DAEMON_KERNEL_H
 #define DAEMON_KERNEL_H
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Any bytes from a gateway to libiwheel-client: the client returns whole messages, within bounds, and the end of the connection ends it once.
-// The connection is a buffer: the linker replaces the system calls by functions of this file (--wrap); the real calls would take most of the time.
+// The connection is a buffer: the linker replaces the system calls by functions of this file (--wrap); the real calls would use most of the time.
 #include "connection.h"
 #include "fuzz.h"
 

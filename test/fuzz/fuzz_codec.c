@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Any bytes as a frame: decoding gives the values of its bytes, and encoding returns the same bytes.
+// Any bytes as a frame: decoding returns the values of its bytes, and encoding returns the same bytes.
 #include "fuzz_sequence.h"
 
 #include "../support/message.h"

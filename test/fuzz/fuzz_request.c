@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Any bytes as a client's line: a request in which every field is valid, or a refusal that can be printed; and the same
-// result as the earlier reader gives (old_reader.h), word for word.
+// result as the earlier reader returns (old_reader.h), word for word.
 #include "fuzz.h"
 
 #include "old_reader.h"

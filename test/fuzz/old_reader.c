@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The gateway's reader of requests until version 0.1, on jansson, with the requests that were added later: the new reader must give the same
+// The gateway's reader of requests until version 0.1, on jansson, with the requests that were added later: the new reader must return the same
 // results. For tests only.
 #include "old_reader.h"
 
@@ -319,7 +319,7 @@ static bool is_complete(const json_t *root, const iwn_request_t *request, iwn_re
         }
     }
     if ((json_object_get(root, "left_mA") == NULL) != (json_object_get(root, "right_mA") == NULL)) {
-        return refuse(out_refusal, IWN_MISSING_FIELD, "give both left_mA and right_mA, or neither");
+        return refuse(out_refusal, IWN_MISSING_FIELD, "send both left_mA and right_mA, or neither");
     }
     return true;
 }

@@ -464,9 +464,9 @@ def junit(status, output):
     return f'<testcase name="t" status="{status}"><system-out>{output}</system-out></testcase>'
 
 
-BIG = "void take(char *);\nvoid iw_g(void);\nvoid iw_g(void) { char buffer[300]; take(buffer); }\n"
-VARIABLE = "void take(char *);\nvoid iw_g(int n);\nvoid iw_g(int n) { char buffer[n]; take(buffer); }\n"
-RECURSION = "int take(int);\nint iw_g(int n);\nint iw_g(int n) { return n > 1 ? take(n) + iw_g(n - 1) * iw_g(n - 2) : 1; }\n"
+BIG = "void fill(char *);\nvoid iw_g(void);\nvoid iw_g(void) { char buffer[300]; fill(buffer); }\n"
+VARIABLE = "void fill(char *);\nvoid iw_g(int n);\nvoid iw_g(int n) { char buffer[n]; fill(buffer); }\n"
+RECURSION = "int fill(int);\nint iw_g(int n);\nint iw_g(int n) { return n > 1 ? fill(n) + iw_g(n - 1) * iw_g(n - 2) : 1; }\n"
 SOME_INDEX = "int main(void) {{ int a[2] = {{1, 2}}; return a[Frama_C_interval(0, {})]; }}\n"
 SOME_FOUR = "f(0, 0); f(1, 0); f(1, 1);"
 

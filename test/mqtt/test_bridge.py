@@ -502,7 +502,7 @@ def test_disk_full_events_wait_in_memory_and_are_reported(rig):
     until(lambda: numbers(far) == list(range(1, last + 1)), 20, f"all {last}")
     until(lambda: "on its disk again" in rig.bridge.text(), what="the disk is used again")
     settle(far)
-    far.print_figures("disk full at 2 kB: events kept in memory, `on_disk` and the log say so")
+    far.print_figures("disk full at 2 kB: events stored in memory, `on_disk` and the log say so")
 
 
 def test_clock_that_steps_changes_neither_ages_nor_order(rig):
@@ -520,7 +520,7 @@ def test_clock_that_steps_changes_neither_ages_nor_order(rig):
     make_stops(rig, 2)
     until(lambda: numbers(far) == [1, 2], what="both")
     settle(far)
-    far.print_figures("wall clock that jumps by two years and back at each look")
+    far.print_figures("wall clock that jumps by two years and back at each reading")
     clocks = [event["heard_wall_us"] for event in far.events()]
     assert max(clocks) - min(clocks) > 86400_000_000, "the clock did step"
 

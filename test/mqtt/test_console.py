@@ -279,7 +279,7 @@ def test_recording_is_fetched_whole_and_overwrites_no_file(rig):
 
 
 def slow_console(rig, *words):
-    """A console behind a line on which a recording takes seconds; `rig.line` can cut it."""
+    """A console behind a line on which a recording needs seconds; `rig.line` can cut it."""
     rig.line = Line(rig.port)
     rig.line.delay = 0.03
     rig.fars.append(rig.line)

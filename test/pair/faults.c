@@ -96,7 +96,7 @@ static int64_t turn_mdeg(const fault_t *fault, situation_t situation, int32_t sp
     return largest;
 }
 
-/// A difference that leaks as fast as it adds up is below the detection limit: docs/user/pair.md gives its degrees per second.
+/// A difference that leaks as fast as it adds up is below the detection limit: docs/user/pair.md states its degrees per second.
 static bool is_unnoticed(const fault_t *fault, int32_t speed_mm_s) {
     const iw_config_t *const config = &machine.gateway.config;
     const int32_t ordinary_mm_s = speed_mm_s * IW_DIVERGE_DROOP_PERCENT / 100 + 10;

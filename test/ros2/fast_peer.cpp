@@ -313,9 +313,9 @@ static void call(const Client &client, bool late) {
                        info.related_sample_identity.sequence_number() == mine.sequence_number();
         }
     }
-    const auto took = std::chrono::steady_clock::now() - begin;
+    const auto span = std::chrono::steady_clock::now() - begin;
     std::printf("%s %d after %d ms: %s\n", answered ? "reply" : "no reply", answered ? static_cast<int>(values.numbers[0]) : -1,
-                static_cast<int>(std::chrono::duration_cast<std::chrono::milliseconds>(took).count()), answered ? values.texts[0].c_str() : "");
+                static_cast<int>(std::chrono::duration_cast<std::chrono::milliseconds>(span).count()), answered ? values.texts[0].c_str() : "");
     std::fflush(stdout);
 }
 

@@ -293,13 +293,13 @@ from diagnostic_msgs.msg import DiagnosticArray
 rclpy.init()
 node = rclpy.create_node("recorder", parameter_overrides=[Parameter("use_sim_time", value=True)])
 out = open(sys.argv[1], "wb")
-def keep(topic, kind):
+def store(topic, kind):
     def write(data):
         out.write(f"{topic} {kind} {len(data)}\\n".encode() + bytes(data))
     return write
 for topic, cls, kind in (("/odom", Odometry, "nav_msgs/msg/Odometry"), ("/joint_states", JointState, "sensor_msgs/msg/JointState"),
                          ("/left/wrench", WrenchStamped, "geometry_msgs/msg/WrenchStamped"), ("/diagnostics", DiagnosticArray, "diagnostic_msgs/msg/DiagnosticArray")):
-    node.create_subscription(cls, topic, keep(topic, kind), QoSProfile(depth=100), raw=True)
+    node.create_subscription(cls, topic, store(topic, kind), QoSProfile(depth=100), raw=True)
 end = time.monotonic() + 5
 while time.monotonic() < end:
     rclpy.spin_once(node, timeout_sec=0.1)

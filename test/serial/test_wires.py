@@ -449,7 +449,7 @@ def rights(t):
     t.judge(rig)
 
 
-@scenario("one port has one relay, and a running gateway keeps its socket", 4)
+@scenario("one port has one relay, and a running gateway retains its socket", 4)
 def alone(t):
     rig, _ = t.running()
     second = subprocess.run(

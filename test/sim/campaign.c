@@ -56,7 +56,7 @@ void campaign_tell_failure(const campaign_t *self, uint64_t seed, const verdict_
     (void)fflush(stdout);
 }
 
-/// Returns true if the same seed gives the same result again.
+/// Returns true if the same seed leads to the same result again.
 static bool replays(const campaign_t *self, uint64_t seed, uint64_t hash) {
     const bool same = self->play(IW_NEVER).hash == hash;
     if (!same) {

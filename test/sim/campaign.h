@@ -45,7 +45,7 @@ void campaign_tell_failure(const campaign_t *self, uint64_t seed, const verdict_
 /// Prints the broken rule in one line.
 void campaign_tell_broken(uint64_t seed, const verdict_t *failed);
 
-/// Plays seeds from `first` on until it is enough or three have failed; each 25th is played twice and must give the same result. `quick`:
+/// Plays seeds from `first` on until it is enough or three have failed; each 25th is played twice and must have the same result. `quick`:
 /// ends at the first seed that fails and does not make it small. Returns an exit status; the last line is "N passed, N failed, 0 skipped".
 int campaign_run(const campaign_t *self, uint64_t first, bool quick);
 

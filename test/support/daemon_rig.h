@@ -26,7 +26,7 @@ typedef struct {
     iw_time_us_t until_us;      ///< End of `daemon_rig_run`.
     iw_time_us_t suspended_us;  ///< Total suspend time that the clocks report.
     iw_time_us_t look_takes_us; ///< Duration of each read of the clock.
-    iw_time_us_t stolen_us;     ///< The next wait takes this much longer: the process does not run.
+    iw_time_us_t stolen_us;     ///< The next wait is longer by this time: the process does not run.
     iw_bus_state_t bus;         ///< State that the bus reports.
     iwl_bus_link_t link;        ///< Facts that the bus reports about its link.
     int estop;                  ///< State that the button reports: 1 pressed, 0 released, -1 unreadable.

@@ -78,7 +78,7 @@ void fake_bus_advance(fake_bus_t *self, iw_time_us_t now_us);
 /// When the next frame gets onto the bus; IW_NEVER if none will.
 iw_time_us_t fake_bus_next_us(const fake_bus_t *self);
 
-/// Takes the interface down or the controller off: the frames that it held are lost.
+/// Sets the interface down or switches the controller off: the frames that it held are lost.
 void fake_bus_break(fake_bus_t *self, iw_bus_state_t state);
 
 /// Speed and current of a setpoint frame, as on the bus.

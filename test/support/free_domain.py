@@ -7,7 +7,7 @@ HELD = []
 
 
 def free_domain():
-    """A domain that no other test on this machine uses while this process runs. Above 100, its ports are those that the kernel gives to any socket."""
+    """A domain that no other test on this machine uses while this process runs. Above 100, its ports are those that the kernel assigns to any socket."""
     for domain in range(1, 101):
         held = socket.socket(socket.AF_UNIX)
         try:

@@ -8,7 +8,7 @@ is "N passed, N failed, N skipped". The exit status is that of verdict.summary.
 
     --build DIR    build under test (build/default)         --jobs N       parallel attempts (2)
     --virtual      in virtual time: pytest_virtual.py       --sample N     N of the tests, selected by the hash of the commit
-    --keep         keeps the folders of the tests           --pdb          runs all tests in this process and judges nothing
+    --keep         retains the folders of the tests        --pdb          runs all tests in this process and judges nothing
 
 A fixture that is a verdict.Evidence collects the findings of a test. If a test fails, the result of a fixture's `said()` is shown and judged too.
 @pytest.mark.full: only with IWHEEL_FULL=1. @pytest.mark.exact: no result depends on time. record_property("tests", N): the test counts as N tests.
@@ -58,7 +58,7 @@ def pytest_addoption(parser):
     group.addoption("--sample", type=int, metavar="N", help="only N of the tests; each commit has another sample")
     group.addoption("--virtual", action="store_true", help="run them in virtual time, in the kernel of test/kernel")
     group.addoption("--inside", metavar="PLAN", help="set by guest_pytest.py: pytest runs inside that kernel")
-    group.addoption("--keep", action="store_true", help="keep the folders with configuration and outputs")
+    group.addoption("--keep", action="store_true", help="do not delete the folders with configuration and outputs")
 
 
 def pytest_configure(config):

@@ -200,7 +200,7 @@ static void test_file_store_refuses_file_with_second_name_or_other_owner(void) {
     assert_not_read(SOCK_FOLDER_FILE);
     TEST_ASSERT_EQUAL_INT(0, unlink(second));
     if (geteuid() != 0) {
-        TEST_MESSAGE("SKIPPED in part: giving a file away needs root");
+        TEST_MESSAGE("SKIPPED in part: changing the owner of a file needs root");
         return;
     }
     TEST_ASSERT_EQUAL_INT(0, chown(in_folder("file"), 65534, 65534));
@@ -230,7 +230,7 @@ static void test_file_store_refuses_folder_writable_by_others(void) {
     assert_no_folder(second, ELOOP);
     TEST_ASSERT_EQUAL_INT(0, unlink(in_folder("link")));
     if (geteuid() != 0) {
-        TEST_MESSAGE("SKIPPED in part: giving a folder away needs root");
+        TEST_MESSAGE("SKIPPED in part: changing the owner of a folder needs root");
         return;
     }
     TEST_ASSERT_EQUAL_INT(0, chown(folder, 65534, 65534));

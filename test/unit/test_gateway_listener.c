@@ -90,7 +90,7 @@ static void refused_to_prepare(int code, const char *why, const char *fix) {
 
 static bool is_root(void) {
     if (geteuid() != 0) {
-        TEST_MESSAGE("SKIPPED: giving files away needs root");
+        TEST_MESSAGE("SKIPPED: changing the owner of files needs root");
     }
     return geteuid() == 0;
 }

@@ -393,7 +393,7 @@ static int go[2];
 static int ready[2];
 
 /// Gateway of a developer: reports whether it is alone, polls the lock again on request, and reports the holder to
-/// which it gives way.
+/// to which it yields.
 static int open_and_tend(void) {
     const int result = open_second();
     const pid_t process = fork();

@@ -313,9 +313,9 @@ TEST(test_inspect_estop_levels_have_their_verdicts) {
 TEST(test_inspect_full_list_counts_further_failures) {
     for (unsigned i = 0; i < INSPECT_FINDINGS_MAX + 3U; i++) {
         inspect_say(&findings, "rates", INSPECT_FAIL, "%u", i);
-        inspect_fix(&findings, "cure %u", i);
+        inspect_fix(&findings, "fix %u", i);
     }
     TEST_ASSERT_EQUAL_UINT(INSPECT_FINDINGS_MAX, findings.count);
     TEST_ASSERT_EQUAL_UINT(INSPECT_FINDINGS_MAX + 3U, findings.total[INSPECT_FAIL]);
-    TEST_ASSERT_EQUAL_STRING("cure 39", findings.finding[INSPECT_FINDINGS_MAX - 1U].fix);
+    TEST_ASSERT_EQUAL_STRING("fix 39", findings.finding[INSPECT_FINDINGS_MAX - 1U].fix);
 }

@@ -78,7 +78,7 @@ TEST(test_why_after_a_crash_has_no_unknown_values) {
     stop.at_once = true;
     iwn_why_sentence(&stop, &context, text, sizeof text);
     TEST_ASSERT_EQUAL_STRING("the gateway before this one died while the wheels were armed; zero at once at 0.000 s; "
-                             "look for the crash in the log, then arm again",
+                             "find the crash in the log, then arm again",
                              text);
 }
 

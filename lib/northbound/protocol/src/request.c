@@ -326,7 +326,7 @@ static bool is_complete(uint32_t seen, iwn_request_t *request, iwn_refusal_t *ou
     request->has_t_us = (seen & 1U << FIELD_t_us) != 0U;
     request->has_stop = (seen & 1U << FIELD_stop) != 0U;
     if (request->has_current != ((seen & 1U << FIELD_right_mA) != 0U)) {
-        return IWN_REFUSE(out_refusal, IWN_MISSING_FIELD, "give both left_mA and right_mA, or neither");
+        return IWN_REFUSE(out_refusal, IWN_MISSING_FIELD, "send both left_mA and right_mA, or neither");
     }
     return true;
 }

@@ -49,7 +49,7 @@ static const row_t rows[IW_CAUSES] = {
     [IW_CAUSE_INTERNAL] = {"an internal check failed ($n)", "report this with the log"},
     [IW_CAUSE_SHUTDOWN] = {"the gateway was shut down", "start it again to go on"},
     [IW_CAUSE_RESTART] = {"the gateway before this one died while the wheels were armed",
-                          "look for the crash in the log, then arm again"},
+                          "find the crash in the log, then arm again"},
     // Causes by a person or a client.
     [IW_CAUSE_ESTOP_SOFTWARE] = {"software e-stop by $c$r", "when it is safe: iwheelctl reset"},
     [IW_CAUSE_LEASE_LOST] = {"$c sent no drive command for $n ms",
