@@ -119,7 +119,7 @@ class BlackBox(WithRig):
         self.assertEqual("contradicted", entries[0]["state"])
         self.assertEqual(("mount_sign_left", "confirmed", "operator"), tuple(entries[-1][name] for name in ("item", "state", "evidence")))
 
-    def test_why_tells_the_recording_and_the_frames_around_the_stop(self):
+    def test_why_after_a_stop_prints_its_recording_and_frames(self):
         stem = self.stop_by_button()
         why = self.why()
         self.assertEqual((stem + ".log", None, self.folder), (why["recording"], why["recording_error"], why["directory"]))
@@ -190,7 +190,7 @@ class BlackBox(WithRig):
         self.assertIn("the process that writes recordings has ended", self.rig.gateway.text())
         self.assertTrue(self.client.request("status")["ok"])
 
-    def test_unusable_directory_is_told_at_start_and_stops_nothing(self):
+    def test_directory_unusable_is_logged_and_stops_nothing(self):
         self.rig.gateway.end()
         end = time.monotonic() + 3
         while os.path.isdir(self.folder) and time.monotonic() < end:  # The gateway's own helpers write their last file after it.
@@ -356,7 +356,7 @@ class Pieces(WithRig):
         """How long the process was on a processor."""
         return int(read(f"/proc/{pid}/schedstat").split()[0]) / 1000
 
-    def test_reading_a_large_one_takes_the_loop_no_time(self):
+    def test_reading_large_recording_does_not_delay_the_loop(self):
         stem = self.stop_by_button()
         self.rig.release()
         large = os.path.join(self.folder, "stop-000002-estop_line.log")

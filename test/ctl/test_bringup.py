@@ -374,7 +374,7 @@ class Bringup(unittest.TestCase):
         operator.type("q\n")
         self.assertEqual(1, operator.wait())
 
-    def test_any_key_stops_the_wheels_at_once(self):
+    def test_any_key_stops_the_wheels_immediately(self):
         operator = self.begin()
         operator.answer("types to try", "1")
         operator.expect("any key stops it")
@@ -390,7 +390,7 @@ class Bringup(unittest.TestCase):
         operator.answer("Try again?", "q")
         self.assertEqual(1, operator.wait())
 
-    def test_no_type_that_moves_asks_again_and_takes_none(self):
+    def test_no_type_that_moves_asks_again_and_stores_none(self):
         self.rig.sim.ask("type 200")
         operator = self.begin()
         operator.answer("types to try", "nonsense")
@@ -401,7 +401,7 @@ class Bringup(unittest.TestCase):
         self.assertEqual(1, operator.wait())
         self.assertFalse(os.path.exists(self.out))
 
-    def test_exchanged_wheels_end_it_with_the_cure(self):
+    def test_exchanged_wheels_end_it_with_the_fix(self):
         operator = self.begin()
         operator.answer("types to try", "1")
         operator.answer("Did both wheels turn", "y")
@@ -437,7 +437,7 @@ class Bringup(unittest.TestCase):
         time.sleep(0.5)
         self.assertEqual(quiet, len(self.rig.bus.setpoints()), "nobody sends any more")
 
-    def test_killed_bringup_takes_its_gateway_with_it(self):
+    def test_killed_bringup_ends_its_gateway(self):
         operator = self.begin()
         operator.answer("types to try", "1")
         operator.expect("any key stops it")
@@ -474,7 +474,7 @@ class Bringup(unittest.TestCase):
         self.assertEqual(1, operator.wait())
         hold(not self.rig.bus.setpoints(), "setpoints without the checks")
 
-    def test_existing_file_is_replaced_only_when_asked_and_kept(self):
+    def test_existing_file_is_replaced_after_a_question_and_saved(self):
         with open(self.out, "w", encoding="utf-8") as file:
             file.write("; precious\n")
         operator = self.begin()
@@ -558,7 +558,7 @@ class Bringup(unittest.TestCase):
         operator.answer("current_role", "q")
         self.assertEqual(1, operator.wait())
 
-    def test_type_that_turns_one_wheel_only_is_not_taken(self):
+    def test_type_that_turns_one_wheel_only_is_not_accepted(self):
         self.rig.sim.ask("block right")
         operator = self.begin()
         operator.answer("types to try", "1")
@@ -605,7 +605,7 @@ class Bringup(unittest.TestCase):
         self.assertEqual("noted: 250 mA without speed turned the left wheel", self.write(operator)["current_role"])
         self.assertEqual("setpoint", self.value("wheels", "current_role"))
 
-    def test_straight_ahead_with_a_wheel_that_stands_is_not_asked(self):
+    def test_straight_ahead_with_one_wheel_still_is_not_asked(self):
         operator = self.begin()
         self.drive_through(operator, signs=False)
         for side in ("left", "right"):

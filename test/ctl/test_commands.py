@@ -76,7 +76,7 @@ class Grammar(unittest.TestCase):
                     (words, right),
                 )
 
-    def test_no_option_of_a_verb_takes_a_time_otherwise(self):
+    def test_no_other_option_of_a_verb_has_a_time(self):
         """A new one belongs into the table above."""
         with_time = {(verb, option) for verb in verbs() for option in re.findall(r"^(--[a-z-]+) TIME", run("help", verb)[1], re.MULTILINE)}
         self.assertEqual({(words[0], words[-1]) for words, _ in self.DURATIONS}, with_time)
@@ -131,7 +131,7 @@ class Json(unittest.TestCase):
             self.assertIn("--json", listed(verb))
             self.assertIn("[--json]", run("help", verb)[1])
 
-    def test_replay_tells_the_same_as_objects(self):
+    def test_replay_as_json_has_the_same_decisions(self):
         recording = os.path.join(ROOT, "test", "recordings", "estop.log")
         code, text, _ = run("replay", recording)
         self.assertEqual(0, code)

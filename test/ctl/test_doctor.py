@@ -137,7 +137,7 @@ class Doctor(unittest.TestCase):
             self.rig.kill_gateway(signal.SIGTERM)
             self.rig.settings["wheels"][key] = right
 
-    def test_second_master_beside_a_gateway(self):
+    def test_second_master_with_a_gateway(self):
         self.rig.start_gateway()
         self.rig.sim.ask("foreign on")
         time.sleep(0.1)

@@ -121,7 +121,7 @@ class EveryCommandExists(unittest.TestCase):
         for place, match in self.find(r"sudo (\S+)"):
             self.assertIn(match.group(1), OURS | set(PROGRAMS), place)
 
-    def test_what_stands_behind_a_colon_is_a_command_that_is_known(self):
+    def test_text_behind_a_colon_is_a_known_command(self):
         prose = {"the"}
         for place, match in self.find(r"(?:then|with|do|see|how): ([a-z][\w-]+)", 40):
             self.assertIn(match.group(1), OURS | set(PROGRAMS) | {"sudo"} | prose, place)
@@ -301,7 +301,7 @@ class CarriedOut(unittest.TestCase):
             self.wait_for(lambda s: s["state"] == "latched", "e-stop")
             self.leave_latch()
 
-    def test_refusals_tell_what_makes_the_same_request_succeed(self):
+    def test_refusal_fix_makes_the_same_request_succeed(self):
         self.rig.start_gateway()
         for fault in ("busoff on", "estop press"):
             self.rig.sim.ask(fault)
@@ -394,7 +394,7 @@ class CarriedOut(unittest.TestCase):
         time.sleep(0.3)
         self.assertNotIn("ledger", self.doctor(), (item, fix))
 
-    def test_doctors_cure_of_each_contradiction_settles_it(self):
+    def test_doctor_fix_of_each_contradiction_clears_it(self):
         wrong = {
             "setpoint_type": "2",
             "current_role": "setpoint",
@@ -551,7 +551,7 @@ class Check(unittest.TestCase):
             self.assertEqual(69, done.returncode, done.stderr)
             self.assertIn("Read-only file system", done.stderr)
 
-    def test_socket_name_that_is_taken_fails_as_the_start_does(self):
+    def test_socket_name_in_use_fails_as_the_start_does(self):
         os.symlink("nowhere", self.rig.path("link"))
         with open(self.rig.path("file"), "w", encoding="utf-8"):
             pass

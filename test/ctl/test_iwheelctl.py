@@ -136,7 +136,7 @@ class Connecting(WithGateway):
         self.assertIn("accepts no connection", err)
         self.assertTrue(1.9 < seconds < 3.5, seconds)
 
-    def test_closed_at_once_is_unavailable(self):
+    def test_connection_closed_immediately_is_unavailable(self):
         class Rude(FakeGateway):
             def greet(self, connection):
                 connection.close()
@@ -145,7 +145,7 @@ class Connecting(WithGateway):
         self.assertEqual(69, code)
         self.assertIn("ended the connection", err)
 
-    def test_refused_connection_tells_the_reason(self):
+    def test_connection_refused_prints_the_reason(self):
         class Full(FakeGateway):
             def greet(self, connection):
                 self.say(connection, {"id": None, "ok": False, "error": "too_many_clients", "message": "16 of 16; close one"})
@@ -154,7 +154,7 @@ class Connecting(WithGateway):
         self.assertEqual(1, code)
         self.assertIn("refused (too_many_clients): 16 of 16; close one", err)
 
-    def test_another_service_on_the_socket_is_told(self):
+    def test_another_service_on_the_socket_is_reported(self):
         for first in (b"ok iwheel-sim\n", b"[1,2]\n", b'{"event":"hi"}\n', b'{"event":"hello","event":"hello"}\n', b"x" * 70000, b"\0\n"):
 
             class Other(FakeGateway):
@@ -216,13 +216,13 @@ class Showing(WithGateway):
         self.assertIn("client lost: at most 887 ms, 0.554 m", out)
         self.assertIn("gateway killed: at most 1000 ms, 1.000 m, then unknown", out)
 
-    def test_zero_of_an_earlier_run_tells_who_took_it_and_when(self):
+    def test_zero_of_an_earlier_run_shows_source_and_time(self):
         stored = {"offset_provenance": "stored", "offset_origin": "operator"}
         out = self.show(snapshot(left=wheel(**stored, offset_age_ms=3 * 86400000), right=wheel(**stored, offset_age_ms=7200000)))
         self.assertRegex(out, r"force offset +8\.000 N stored \(operator\) +8\.000 N stored \(operator\)")
         self.assertRegex(out, r"offset age +3 days ago, 0\.010 N noise +2 h ago")
 
-    def test_zero_taken_under_load_is_in_doubt(self):
+    def test_zero_measured_under_load_is_in_doubt(self):
         none = wheel(force_offset_mN=None, offset_provenance="none", offset_origin=None, offset_contaminated=True)
         self.assertRegex(self.show(snapshot(left=none)), r"force offset +-- none IN DOUBT +8\.000 N wheel")
 
@@ -363,7 +363,7 @@ class Showing(WithGateway):
         process.send_signal(signal.SIGINT)
         process.communicate(timeout=10)
 
-    def test_latched_names_cause_sentence_and_cure(self):
+    def test_latched_names_cause_sentence_and_fix(self):
         out = self.show(
             snapshot("latched", cause="wheel_lost"), why={"ok": True, "number": 1, "sentence": "left wheel sent no telemetry for 53 ms", "latched": True}
         )
@@ -372,13 +372,13 @@ class Showing(WithGateway):
         self.assertIn("iwheelctl reset", out)
         self.assertIn("left wheel sent no telemetry for 53 ms", out)
 
-    def test_held_zeros_are_told_and_what_ends_them(self):
+    def test_held_zeros_are_shown_with_what_ends_them(self):
         out = self.show(snapshot("stopping", cause="client_stop", holding=True))
         self.assertIn("stopping (client_stop), holding", out)
         self.assertIn("iwheelctl release", out)
         self.assertNotIn("iwheelctl release", self.show(snapshot("stopping", cause="client_stop")))
 
-    def test_listening_names_what_keeps_it_from_arming(self):
+    def test_listening_names_what_prevents_arming(self):
         unset = {
             "setpoint_type": {"state": "assumed", "evidence": "none"},
             "track": {"state": "assumed", "evidence": "none"},
@@ -498,7 +498,7 @@ class Asking(WithGateway):
         for words in (("set",), ("set", "drive.lease_ms"), ("set", "a", "b", "c"), ("show", "me"), ("write",)):
             self.assertEqual(64, self.ctl("config", *words)[0], words)
 
-    def test_a_ledger_in_figures_alone_is_told_in_the_same_words(self):
+    def test_ledger_in_figures_alone_has_the_same_texts(self):
         figures = {
             "force_unit_left": {"state": "confirmed", "evidence": "bus", "figure": 10012, "value": "cN"},
             "track": {"state": "assumed", "evidence": "none", "figure": None, "value": "540"},
@@ -739,7 +739,7 @@ class Driving(WithGateway):
         self.assertEqual((1, 0), (process.returncode, gateway.count("drive")))
         self.assertIn("interrupted", err)
 
-    def test_every_signal_stops_at_once_and_waits_for_rest(self):
+    def test_every_signal_stops_immediately_and_waits(self):
         for number in SIGNALS:
             gateway = self.serve(FakeGateway)
             process = start("--socket", gateway.path, "drive", "200", "200", "--for", "60s")
@@ -795,7 +795,7 @@ class Driving(WithGateway):
         self.assert_stopped_once(gateway)
         self.assertTrue(0.9 < gateway.times("stop")[0] - gateway.times("drive")[4] < 1.3)
 
-    def test_lost_gateway_is_told(self):
+    def test_lost_gateway_is_reported(self):
         class Dying(FakeGateway):
             def on_drive(self, connection, request):
                 if self.driving > 5:
@@ -828,7 +828,7 @@ class Driving(WithGateway):
         self.assertIn("drove 1/2 mm/s", out)
         self.assertIn("while stopping the gateway latched (wheel_rebooted)", err)
 
-    def test_lost_wheel_after_the_stop_is_told_not_waited_for(self):
+    def test_lost_wheel_after_the_stop_is_reported_without_wait(self):
         class Unheard(FakeGateway):
             def on_status(self, connection, request):
                 if self.stopped_at is None:
@@ -958,7 +958,7 @@ class Watching(WithGateway):
         self.assertEqual(69, process.returncode)
         self.assertIn("ended the connection", err)
 
-    def test_full_disk_is_told(self):
+    def test_full_disk_is_reported(self):
         with open("/dev/full", "w", encoding="ascii") as full:
             process = start("--socket", self.serve(self.Talkative).path, "watch", stdout=full)
             _, err = process.communicate(timeout=10)

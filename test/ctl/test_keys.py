@@ -62,7 +62,7 @@ class Keys(unittest.TestCase):
         while not holds(self.status()):
             self.assertLess(time.monotonic(), end, what)
 
-    def test_each_key_plants_its_fault_tells_so_and_takes_it_back(self):
+    def test_each_key_injects_reports_and_removes_its_fault(self):
         operator = self.start()
         operator.expect("quit")
         for key, fault in TOGGLES.items():
@@ -85,7 +85,7 @@ class Keys(unittest.TestCase):
         self.assertEqual(0, operator.wait())
         self.assertIn("ended", operator.text)
 
-    def test_normal_takes_back_all_and_an_unknown_key_does_nothing(self):
+    def test_normal_removes_all_and_an_unknown_key_does_nothing(self):
         operator = self.start()
         operator.type("mbeZ$")
         self.wait_for(lambda s: s["left"]["muted"] and s["left"]["blocked"] and s["estop"] == "pressed", "three")

@@ -248,13 +248,13 @@ class Lacks(unittest.TestCase):
         for which in ((True, False), (False, True)):
             self.differs({"current_role": (AGAINST, None), **({"force_unit left": OPEN} if which[0] else {"force_unit right": OPEN})}, runs_at_zero=which)
 
-    def test_learn_too_short_phases_tell_nothing_of_wheels(self):
+    def test_learn_too_short_phases_have_no_wheel_findings(self):
         self.differs(
             {"setpoint_type": OPEN, "current_role": OPEN, "pose_byte_order": OPEN, **self.both("feedback_sign", "speed_scale", "ticks_per_turn", "force_unit")},
             phase_ms=300,
         )
 
-    def test_learn_too_few_setpoints_tell_nothing(self):
+    def test_learn_too_few_setpoints_have_no_findings(self):
         found = findings(Story(setpoint_ms=4000))
         for item in ("setpoint_type", "current_role", "setpoint_dlc"):
             self.assertEqual(OPEN, found[(item, None)], item)
@@ -270,7 +270,7 @@ class Lacks(unittest.TestCase):
         found = self.differs(unsure, second_type=9)
         self.assertEqual((AGAINST, None), found[("sender", "left")])
 
-    def test_learn_other_type_at_rest_is_told(self):
+    def test_learn_other_type_at_standstill_is_reported(self):
         found = self.differs({}, rest_type=0)
         self.assertEqual(OPEN, found[("setpoint_type", "left")])
         self.assertEqual(OPEN, found[("setpoint_type", "right")])
@@ -288,7 +288,7 @@ class Lacks(unittest.TestCase):
         for currents in (("same", "scaled"), ("scaled", "same"), ("same", "zero"), ("negative", "scaled")):
             self.differs({"current_role": OPEN}, currents=currents)
 
-    def test_learn_sign_is_told_only_of_the_direction_that_was_seen(self):
+    def test_learn_sign_is_reported_only_for_the_seen_direction(self):
         for phase, word in (("forward", "positive"), ("backward", "negative")):
             _, out, _ = learn(Story(phases=("rest", phase)))
             self.assertIn(f"+ left: a {word} setpoint is measured as a {word} speed (the other direction: not recorded)", out)
@@ -297,7 +297,7 @@ class Lacks(unittest.TestCase):
         self.differs({"feedback_sign right": (AGAINST, "no"), "pair": (AGAINST, None)}, signs=(1, -1))
         self.differs(self.both("feedback_sign", verdict=(AGAINST, None)), flips=True)
 
-    def test_learn_gear_is_told_by_ratio_and_by_ticks(self):
+    def test_learn_gear_is_reported_by_ratio_and_ticks(self):
         self.differs(self.both("speed_scale", verdict=(AGAINST, None)), rpm_per_speed=3 / 20.106)
         self.differs(self.both("ticks_per_turn", verdict=(AGAINST, None)), ticks_per_turn=240)
 

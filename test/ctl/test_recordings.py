@@ -335,7 +335,7 @@ class Decode(unittest.TestCase):
                 self.assertEqual(65, code, (name, out, err))
                 self.assertNotRegex(out + err, "[\x7f-\x9f\u2028-\u202e]")
 
-    def test_thousand_bad_lines_are_counted_not_told(self):
+    def test_thousand_bad_lines_are_counted_not_printed(self):
         code, _, err = self.decode("x\n" * 1000)
         self.assertEqual(65, code)
         self.assertLess(len(err.splitlines()), 15)
@@ -346,7 +346,7 @@ class Decode(unittest.TestCase):
         self.assertEqual(65, code)
         self.assertIn("screen form; record with candump -L", err)
 
-    def test_config_gives_the_unit_of_force(self):
+    def test_config_determines_the_unit_of_force(self):
         with tempfile.NamedTemporaryFile("w", suffix=".conf") as file:
             file.write("[left]\nforce_unit = dN\n")
             file.flush()
@@ -362,7 +362,7 @@ class Decode(unittest.TestCase):
         self.assertEqual(0, code)
         self.assertIn("-1.250000", out)
 
-    def test_wrong_words_and_files_are_told(self):
+    def test_wrong_words_and_files_are_reported(self):
         for words, code, part in (
             (("--nonsense",), 64, "does not understand"),
             (("a", "b"), 64, '"b"'),
@@ -375,7 +375,7 @@ class Decode(unittest.TestCase):
             self.assertEqual((code, ""), (got, out), words)
             self.assertIn(part, err)
 
-    def test_empty_recording_is_told(self):
+    def test_empty_recording_is_reported(self):
         code, _, err = self.decode("")
         self.assertEqual(65, code)
         self.assertIn("it has no frame", err)
@@ -425,7 +425,7 @@ class Decode(unittest.TestCase):
         self.assertEqual([True, False], [objects[6]["extended"], objects[0]["extended"]])
         self.assertTrue(objects[7]["remote"])
 
-    def test_csv_and_json_at_once_are_refused(self):
+    def test_csv_together_with_json_is_refused(self):
         code, out, err = run("--json", "decode", "--csv", text=lines("100#000F0001"))
         self.assertEqual((64, ""), (code, out))
         self.assertIn("not both", err)
@@ -475,7 +475,7 @@ class Replay(unittest.TestCase):
         same, of = (int(out.split("setpoints on the bus: ")[1].split()[i]) for i in (0, 2))
         self.assertLess(same, of)
 
-    def test_another_decision_than_recorded_is_told(self):
+    def test_another_decision_than_recorded_is_reported(self):
         self.change(
             "jsonl",
             lambda text: text.replace('"type":"stopped"', '"type":"stopped"').replace(
@@ -511,7 +511,7 @@ class Replay(unittest.TestCase):
         self.assertEqual(0, code)
         self.assertIn("fault      second_master", out)
 
-    def test_cut_files_are_replayed_as_far_as_they_go_and_told(self):
+    def test_cut_files_are_replayed_to_their_end_and_reported(self):
         self.change("jsonl", lambda text: text[: len(text) // 2])
         self.change("log", lambda text: text[: len(text) * 2 // 3])
         code, out, err = self.replay()
@@ -546,7 +546,7 @@ class Replay(unittest.TestCase):
         self.assertIn("cut to 60 s", out)
         self.assertIn("time goes back 1 times", out)
 
-    def test_wrong_words_are_told(self):
+    def test_wrong_words_are_reported(self):
         for words, code, part in (
             ((), 64, "needs a recording"),
             (("--x",), 64, "does not understand"),
@@ -559,7 +559,7 @@ class Replay(unittest.TestCase):
 
 
 class Why(unittest.TestCase):
-    def test_recorded_stop_is_told_without_a_gateway(self):
+    def test_recorded_stop_is_printed_without_a_gateway(self):
         code, out, err = run("why", "estop.jsonl", "--frames", "3", cwd=GOLDEN)
         self.assertEqual((0, ""), (code, err))
         shown = out.splitlines()
@@ -626,7 +626,7 @@ class Learn(unittest.TestCase):
         self.assertEqual((0, ""), (code, err))
         return out
 
-    def test_type_ranges_length_and_period_are_told_and_suggested(self):
+    def test_type_ranges_length_period_are_printed_and_suggested(self):
         out = self.learn(types=(7, 7), extra=b"\0\0\0")
         for part in (
             "type       7 (100 %)",
@@ -658,7 +658,7 @@ class Learn(unittest.TestCase):
         self.assertIn("- setpoint type: setpoints with a speed have several types, or different ones", out)
         self.assertNotIn("setpoint_type =", out)
 
-    def test_wheel_that_turns_against_its_command_is_told(self):
+    def test_wheel_that_turns_against_its_command_is_reported(self):
         out = self.learn(sign=(1, -1))
         self.assertIn("- right: a positive setpoint is measured as a NEGATIVE speed", out)
         self.assertIn("+ left: a positive", out)
@@ -688,7 +688,7 @@ class Learn(unittest.TestCase):
         _, out, _ = run("learn", "-", text=text)
         self.assertIn("- left: the type changes 99 times in 100 setpoints: two controllers", out)
 
-    def test_oddities_are_told(self):
+    def test_oddities_are_reported(self):
         text = lines("10A#0101F4FFFF07", "10A#0101F40BB8", "10A#R5", "0000010A#00", "10A#01", "20000004#00", "333#00")
         code, out, _ = run("learn", "-", text=text + lines("100#00000000"))
         self.assertEqual(0, code)
@@ -708,6 +708,6 @@ class Learn(unittest.TestCase):
         self.assertEqual(1, code)
         self.assertIn("? setpoint type and current role: the recording has no setpoint", out)
 
-    def test_wrong_words_are_told(self):
+    def test_wrong_words_are_reported(self):
         for words, code in (((), 64), (("--x",), 64), (("a", "b"), 64), (("/nonexistent",), 65)):
             self.assertEqual((code, ""), run("learn", *words)[:2])

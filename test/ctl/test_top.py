@@ -228,7 +228,7 @@ class WithWheels(unittest.TestCase):
                 process.terminate()
                 process.wait()
 
-    def test_where_there_is_no_room_there_is_no_plot(self):
+    def test_small_terminal_has_no_plot(self):
         top = self.top(80, 24)
         self.assertFalse(any("last minute" in row or "60 s ago" in row for row in top.wait_for("LEDGER")))
         top.resize(80, 36)
@@ -264,7 +264,7 @@ class WithWheels(unittest.TestCase):
         top.wait_for("LEDGER")
         self.assertEqual(0, top.end())
 
-    def test_gateway_that_hangs_is_told(self):
+    def test_gateway_that_hangs_is_reported(self):
         top = self.top(40, 12)  # Small, so that the word is written in plain letters.
         top.wait_for("LISTENING")
         self.rig.gateway.signal(signal.SIGSTOP)

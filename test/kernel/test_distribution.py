@@ -33,15 +33,15 @@ class Distribution(unittest.TestCase):
         with mock.patch.object(distribution.shutil, "which", side_effect=lambda name, path: None if name == "cpio" else name):
             self.assertIn("apt-get install cpio", distribution.why_not_emulated("amd64"))
 
-    def test_another_machine_is_told(self):
+    def test_another_machine_is_reported(self):
         with mock.patch.object(distribution.os, "uname", return_value=mock.Mock(machine="riscv64")):
             self.assertIn("this machine is riscv64", distribution.why_not_emulated("amd64"))
 
-    def test_a_distribution_without_such_a_package_is_told(self):
+    def test_distribution_without_such_a_package_is_reported(self):
         with answers("linux-image-amd64\n"):
             self.assertIn("no package linux-image-amd64", distribution.why_not_emulated("amd64"))
 
-    def test_what_apt_says_is_told(self):
+    def test_output_of_apt_is_reported(self):
         with answers("E: No packages found\n", code=100):
             self.assertIn("E: No packages found", distribution.why_not_emulated("amd64"))
 

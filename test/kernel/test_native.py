@@ -35,7 +35,7 @@ class Native(unittest.TestCase):
         with answers(0):
             self.assertIsNone(native.why_not_native())
 
-    def test_not_root_names_the_cure(self):
+    def test_not_root_names_the_fix(self):
         with mock.patch.object(native.os, "geteuid", return_value=1000), answers(0):
             self.assertIn("sudo", native.why_not_native())
 
@@ -47,11 +47,11 @@ class Native(unittest.TestCase):
         with mock.patch.object(native, "GPIO_SIM", self.folder + "/none"), answers(0):
             self.assertIn("modprobe gpio-sim", native.why_not_native())
 
-    def test_no_vcan_tells_what_ip_said(self):
+    def test_no_vcan_reports_the_output_of_ip(self):
         with answers(2, "Error: Unknown device type.\n"), mock.patch.object(native, "why_not_alone", return_value=None):
             self.assertRegex(native.why_not_native(), "modprobe vcan.*Unknown device type")
 
-    def test_chroot_of_a_plain_folder_names_the_cure(self):
+    def test_chroot_of_a_plain_folder_names_the_fix(self):
         with answers(1, "unshare: cannot change root filesystem propagation: Invalid argument\n"):
             self.assertRegex(native.why_not_native(), "propagation.*mount --bind")
 

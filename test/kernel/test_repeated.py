@@ -55,10 +55,10 @@ class Campaigns(unittest.TestCase):
         self.assertRegex(lines[3], "3 of 3 campaigns .* 2 without a failure, 1 with one")
         self.assertEqual("2 passed, 1 failed, 0 skipped", lines[-1])
 
-    def test_one_campaign_is_told_without_a_summary(self):
+    def test_one_campaign_is_printed_without_a_summary(self):
         self.assertEqual((0, ["1 passed, 0 failed, 0 skipped"]), self.run_main([], [[result("row12_glitch")]]))
 
-    def test_interrupted_row_tells_what_was_whole(self):
+    def test_interrupted_row_prints_complete_campaigns(self):
         code, lines = self.run_main(["--repeat", "3"], [[result("row12_glitch")], None])
         self.assertEqual((campaign.INTERRUPTED, "1 passed, 0 failed, 0 skipped"), (code, lines[-1]))
         self.assertRegex(lines[1], "^1 of 3 campaigns")
@@ -66,7 +66,7 @@ class Campaigns(unittest.TestCase):
 
 
 class Summary(unittest.TestCase):
-    def test_not_judged_is_told_and_is_not_passed(self):
+    def test_not_judged_is_reported_and_is_not_passed(self):
         lines = list(repeated.summary([outcome(1, result("row12_glitch", "skipped"), result("row13_chatter"))], 1))
         self.assertIn("1 of 2 tests passed every time", lines)
         self.assertIn("estop/row12_glitch was not judged in 1 of 1, with seed 1", lines)
@@ -86,7 +86,7 @@ class Page(unittest.TestCase):
                 report.write(list(outcomes), campaign.parse([]))
             return file.read()
 
-    def test_real_time_is_told_from_the_level(self):
+    def test_real_time_follows_from_the_level(self):
         text = self.page(outcome(1, result("row11_presses_real_time", group="realtime", from_level=[1000, 2500])))
         self.assertIn("| real | the level | 2 | 1.00 ms | 2.50 ms | 2.50 ms |", text)
         self.assertIn("| real | the edge | none judged", text)

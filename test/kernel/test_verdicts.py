@@ -59,7 +59,7 @@ class Witnessed(unittest.TestCase):
 
 
 class Verdicts(Witnessed):
-    def test_late_gateway_on_a_quiet_machine_fails_at_once(self):
+    def test_late_gateway_on_a_quiet_machine_fails_immediately(self):
         for failures in ([GAP], [REFUSED], [GAP, REFUSED], [PAIR]):
             with self.subTest(failures):
                 self.assertEqual(("failed", 1), self.outcome(*failures))
@@ -120,12 +120,12 @@ class Presses(Witnessed):
         self.assertFalse(self.excused(30_000))
         self.assertFalse(self.excused(30_000, kernel_rig.LEVEL_US))
 
-    def test_late_stop_beside_a_late_machine_does_not(self):
+    def test_late_stop_on_a_late_machine_does_not(self):
         self.late(FAULT_US + 12_000, 10_000)
         self.assertTrue(self.excused(30_000))
         self.assertTrue(self.excused(30_000, kernel_rig.LEVEL_US))
 
-    def test_stop_in_time_counts_whatever_was_beside_it(self):
+    def test_stop_in_time_counts_whatever_else_ran(self):
         self.late(FAULT_US + 4_000, 10_000)
         self.assertFalse(self.excused(kernel_rig.ESTOP_US))
         self.assertFalse(self.excused(kernel_rig.LEVEL_US, kernel_rig.LEVEL_US))

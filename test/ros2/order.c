@@ -254,7 +254,7 @@ static void test_ros_estop_topic_shows_the_line_once_for_each_change(void) {
     TEST_ASSERT_EQUAL_INT(1, estop_shown); // A line that has disappeared counts as unreadable.
 }
 
-static void test_ros_arm_takes_no_lease_from_another_client(void) {
+static void test_ros_arm_moves_no_lease_of_another_client(void) {
     const int other = daemon_rig_connect();
     daemon_rig_arm(other);
     request_comes(ROS_ARM);
@@ -384,7 +384,7 @@ static void test_ros_one_person_drives_of_two_that_publish(void) {
     TEST_ASSERT_GREATER_THAN_INT16(100, daemon_rig.commanded_mm_s[IW_LEFT]);
 }
 
-static void test_ros_one_person_keeps_the_wheels_until_they_are_stopped(void) {
+static void test_ros_one_person_has_the_wheels_until_they_are_stopped(void) {
     arm();
     command_comes_of(2, 0.0); // Zeros do not take over.
     command_comes_of(1, 0.3);
@@ -546,7 +546,7 @@ int main(void) {
     RUN_TEST(test_ros_estop_latches_and_reset_is_not_for_the_network);
     RUN_TEST(test_ros_command_with_an_old_header_is_not_passed);
     RUN_TEST(test_ros_estop_topic_shows_the_line_once_for_each_change);
-    RUN_TEST(test_ros_arm_takes_no_lease_from_another_client);
+    RUN_TEST(test_ros_arm_moves_no_lease_of_another_client);
     RUN_TEST(test_ros_arm_that_was_late_is_refused);
     RUN_TEST(test_ros_first_command_of_a_minute_ago_moves_nothing);
     RUN_TEST(test_ros_first_request_of_a_minute_ago_is_refused);
@@ -555,7 +555,7 @@ int main(void) {
     RUN_TEST(test_ros_arm_from_before_a_stop_is_refused_by_the_gateway);
     RUN_TEST(test_ros_arm_while_a_dropped_command_moves_is_refused);
     RUN_TEST(test_ros_one_person_drives_of_two_that_publish);
-    RUN_TEST(test_ros_one_person_keeps_the_wheels_until_they_are_stopped);
+    RUN_TEST(test_ros_one_person_has_the_wheels_until_they_are_stopped);
     RUN_TEST(test_ros_one_person_without_the_lease_has_nothing);
     RUN_TEST(test_ros_lease_that_ended_unseen_is_nobodys);
     RUN_TEST(test_ros_other_machine_without_synchronised_clock_cannot_arm);

@@ -63,6 +63,6 @@ def commands():
 
 
 @pytest.mark.exact
-def test_page_tells_the_boards_pins_and_files():
+def test_page_has_the_boards_pins_and_files():
     page = PAGE.read_text()
     assert [text for text in (*rows(), *commands()) if text not in page] == []

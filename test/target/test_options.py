@@ -41,7 +41,7 @@ def compile_probe(clock_mhz, out):
 
 
 @pytest.mark.parametrize("mhz", CLOCKS_THAT_CAN)
-def test_bus_clock_gives_the_bus_exactly(mhz, tmp_path):
+def test_bus_clock_leads_to_the_exact_bit_rate(mhz, tmp_path):
     done = compile_probe(mhz, tmp_path / "probe")
     assert done.returncode == 0, done.stderr
     must([tmp_path / "probe"])
@@ -105,7 +105,7 @@ def port(tmp_path):
 
 
 @pytest.mark.parametrize("name", [name or "without_a_name.c" for name, _ in PAGE])
-def test_file_of_the_page_stands_alone(port, name, tmp_path):
+def test_file_of_the_page_is_complete(port, name, tmp_path):
     must([*port, "-std=c99", "-fsyntax-only", "-xc", tmp_path / name])
 
 

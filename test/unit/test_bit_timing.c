@@ -255,14 +255,14 @@ TEST(test_achieved_every_bxcan_setting_is_within_half_a_unit) {
     }
 }
 
-TEST(test_achieved_slower_than_any_number_gives_zeros) {
+TEST(test_achieved_slower_than_any_number_is_zeros) {
     const iw_bit_timing_t timing = {65535, 65535, 65535};
     const iw_bit_timing_achieved_t achieved = iw_bit_timing_achieved(32 * MHZ, &timing);
     TEST_ASSERT_EQUAL_UINT32(0, achieved.bitrate_hz);
     TEST_ASSERT_EQUAL_UINT16(0, achieved.sample_point_permille);
 }
 
-TEST(test_achieved_prescaler_zero_gives_zeros) {
+TEST(test_achieved_prescaler_zero_is_zeros) {
     const iw_bit_timing_t timing = {0, 4, 3};
     const iw_bit_timing_achieved_t achieved = iw_bit_timing_achieved(32 * MHZ, &timing);
     TEST_ASSERT_EQUAL_UINT32(0, achieved.bitrate_hz);

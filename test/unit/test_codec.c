@@ -70,7 +70,7 @@ TEST(test_golden_table_covers_all_eleven_messages) {
     TEST_ASSERT_EQUAL_UINT(55, GOLDEN_VECTORS);
 }
 
-TEST(test_decode_golden_frame_gives_golden_values) {
+TEST(test_decode_golden_frame_returns_golden_values) {
     for (size_t v = 0; v < GOLDEN_VECTORS; v++) {
         const golden_vector_t *golden = &golden_vectors[v];
         message_t message;
@@ -80,7 +80,7 @@ TEST(test_decode_golden_frame_gives_golden_values) {
     }
 }
 
-TEST(test_encode_golden_values_gives_golden_frame) {
+TEST(test_encode_golden_values_returns_golden_frame) {
     for (size_t v = 0; v < GOLDEN_VECTORS; v++) {
         const golden_vector_t *golden = &golden_vectors[v];
         iw_can_frame_t frame;
@@ -183,7 +183,7 @@ TEST(test_codec_name_of_each_kind) {
     TEST_ASSERT_EQUAL_STRING("setpoint", iw_codec_name(IW_CODEC_SETPOINT));
 }
 
-TEST(test_decode_own_echo_gives_the_same_values) {
+TEST(test_decode_own_echo_returns_the_same_values) {
     for (size_t v = 0; v < GOLDEN_VECTORS; v++) {
         iw_can_frame_t frame = golden_vectors[v].frame;
         message_t message;

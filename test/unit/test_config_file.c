@@ -67,7 +67,7 @@ static void assert_fixed_point(const gateway_config_t *from) {
     free(second);
 }
 
-TEST(test_parse_empty_file_gives_documented_defaults) {
+TEST(test_parse_empty_file_sets_documented_defaults) {
     accepted("");
     TEST_ASSERT_EQUAL_STRING("can0", config.bus.interface);
     TEST_ASSERT_EQUAL_UINT32(1000000, config.bus.bitrate);

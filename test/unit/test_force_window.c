@@ -348,7 +348,7 @@ TEST(test_force_unit_observation_requires_window_and_offset) {
     TEST_ASSERT_EQUAL_INT(IW_UNIT_CN, rig.force.observation);
 }
 
-TEST(test_force_contaminated_window_gives_no_unit_observation) {
+TEST(test_force_contaminated_window_has_no_unit_observation) {
     force_rig_alternate(&rig, 0, 2000);
     force_rig_offset(&rig, 100);
     TEST_ASSERT_EQUAL_INT(IW_UNIT_UNKNOWN, rig.force.observation);

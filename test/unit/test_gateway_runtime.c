@@ -410,7 +410,7 @@ static int open_and_tend(void) {
     return (read(ready[0], &byte, 1) == 1) ? result : -1;
 }
 
-TEST(test_lock_held_by_another_user_is_given_up_to_root) {
+TEST(test_lock_held_by_another_user_yields_to_root) {
     gw_holder_t holder = {0};
     if (!is_root()) {
         return;

@@ -87,7 +87,7 @@ TEST(test_wakeup_is_not_before_its_time) {
     check_wakes_at_its_time_and_not_before();
 }
 
-TEST(test_wakeup_uses_the_given_time) {
+TEST(test_wakeup_uses_the_requested_time) {
     check_time_that_was_read_before_is_not_read_again();
 }
 

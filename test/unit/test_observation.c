@@ -267,7 +267,7 @@ TEST(test_observation_reboot_in_the_status_frame_judges_nothing) {
     assert_ratio(IW_ASSUMED, 0);
 }
 
-TEST(test_observation_wheel_below_10_rpm_gives_no_ratio) {
+TEST(test_observation_wheel_below_10_rpm_has_no_ratio) {
     begin_stretch(9);
     for (unsigned i = 0; i < FRAMES; i++) {
         speed_of(IW_LEFT, (i % 2U == 0U) ? 11 : 9, FRAME_US);
@@ -350,7 +350,7 @@ TEST(test_observation_one_rpm_depends_on_the_wheel_radius) {
     assert_type(IW_CONFIRMED, 1172);
 }
 
-TEST(test_observation_command_below_150_mm_s_gives_no_type) {
+TEST(test_observation_command_below_150_mm_s_has_no_type) {
     assert_drive(150, 150, true);
     assert_drive(-150, -150, true);
     assert_drive(149, 149, false);

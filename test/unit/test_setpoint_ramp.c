@@ -314,7 +314,7 @@ static void brake_at_a_random_moment(fixture_random_t *random) {
     setpoint_rig_demand(&rig, IW_DEMAND_BRAKE);
 }
 
-TEST(test_setpoint_stop_takes_no_longer_than_the_fastest_ramp) {
+TEST(test_setpoint_stop_is_no_longer_than_the_fastest_ramp) {
     fixture_random_t random;
     fixture_random_init(&random, 5);
     for (uint32_t n = 0; n < 1000; n++) {

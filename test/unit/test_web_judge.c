@@ -131,7 +131,7 @@ TEST(test_stop_never_needs_a_proof) {
     TEST_ASSERT_EQUAL_UINT(421, status());
 }
 
-TEST(test_header_given_twice_is_refused) {
+TEST(test_header_sent_twice_is_refused) {
     asked.is_doubled = true;
     TEST_ASSERT_EQUAL_UINT(400, status());
     asked.has_body = true;

@@ -106,7 +106,7 @@ TEST(test_yaw_bound_is_the_growth_up_to_the_limit) {
 }
 
 /// 2 um/s are reserved for the rounding of both wheels.
-TEST(test_yaw_room_is_the_margin_on_the_side_of_the_change) {
+TEST(test_yaw_margin_is_on_the_side_of_the_change) {
     static const struct {
         int32_t bound, from, change;
         uint32_t margin;
