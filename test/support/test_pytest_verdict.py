@@ -104,6 +104,13 @@ FAULTS = (
         "pass",
         "test_native_test_is_left_out_of_virtual_time",
     ),
+    (
+        "the rest of a sample is the sample",
+        "(item in chosen) != (config.option.sample > 0)",
+        "item not in chosen",
+        "test_sample_has_native_tests_and_the_rest_has_the_others",
+    ),
+    ("a sample can leave out a native test", "return native + sorted", "return sorted", "test_sample_has_native_tests_and_the_rest_has_the_others"),
     ("the sample is always the same", 'f"{key} {item.nodeid}"', "item.nodeid", "test_sample_is_of_the_commit"),
     ("an interrupted run goes on", "        self.over = True\n        self.nursery.close()\n", "", "test_interrupted_run_ends_with_its_tests"),
 )
@@ -561,6 +568,13 @@ class Chosen(Made):
         self.assertEqual("4 passed, 0 failed, 0 skipped", first.last, first.lines)
         self.assertEqual(first.cases, again.cases)
         self.assertNotEqual(first.cases, other.cases)
+
+    def test_sample_has_native_tests_and_the_rest_has_the_others(self):
+        many = 'import pytest\n@pytest.mark.parametrize("number", range(9))\ndef test_it(number):\n    pass\n'
+        many += '@pytest.mark.native("a race")\ndef test_race():\n    pass\n'
+        chosen, rest = (self.run_made(many, f"--sample={number}") for number in (4, -4))
+        self.assertEqual(("5 passed, 0 failed, 0 skipped", True), (chosen.last, "test_race" in chosen.cases), chosen.lines)
+        self.assertEqual(("5 passed, 0 failed, 0 skipped", 10), (rest.last, len({**chosen.cases, **rest.cases})), rest.lines)
 
     def test_nothing_that_ran_is_no_success(self):
         for tests, options, last in (

@@ -205,6 +205,8 @@ def wait_connect(path, process, seconds=5.0):
 class Rig:
     """One simulator, one bus recorder, one gateway (restartable), one timeline."""
 
+    exit_clears = True  # The simulator forgets the waiting frames of a client that ends; a kernel does not.
+
     def __init__(self, build, config=None, sim_args=(), estop=True):
         self.build = build
         self.folder = tempfile.mkdtemp(prefix="iwheel-")
@@ -405,7 +407,14 @@ class Rig:
         finished_us = now_us() - 20_000
         self.bus.close()
         frames = [frame for frame in self.bus.frames if frame.t_us <= finished_us]
-        judge = Judge(self.judge_config(), frames, self.timeline, moves=moves, finished_us=finished_us, **{"pair_limit_us": PAIR_REAL_US, **options})
+        judge = Judge(
+            self.judge_config(),
+            frames,
+            self.timeline,
+            moves=moves,
+            finished_us=finished_us,
+            **{"pair_limit_us": PAIR_REAL_US, "exit_clears": self.exit_clears, **options},
+        )
         judge.judge()
         return judge
 

@@ -217,8 +217,9 @@ class Judge(Reading):
             self._say("pair", waiting.t_us, "a left setpoint without its right one", 0)
 
     def _alone(self, setpoint):
-        """A pair may be broken only by the death of the process in its middle, or by the end of the recording."""
-        died = any(event.kind == "end" and abs(event.t_us - setpoint.t_us) < JITTER_US for event in self.events)
+        """A pair may be broken only by the death of the process in its middle, or by the end of the recording; a zero pair by an exit that clears."""
+        kinds = ("end", "exit") if self.exit_clears and setpoint.zero else ("end",)
+        died = any(event.kind in kinds and abs(event.t_us - setpoint.t_us) < JITTER_US for event in self.events)
         return not died and setpoint.t_us < self.finished_us - PAIR_US
 
     def _presence(self, session, next_us):

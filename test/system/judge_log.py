@@ -106,8 +106,9 @@ def signed(data, at):
 class Reading:
     """Setpoints, sessions and windows of a dead bus, and what is wrong with their form. `found` collects violations."""
 
-    def __init__(self, config, frames, events, moves=True, finished_us=None, estop_limit_us=ESTOP_US, pair_limit_us=PAIR_US):
+    def __init__(self, config, frames, events, moves=True, finished_us=None, estop_limit_us=ESTOP_US, pair_limit_us=PAIR_US, exit_clears=False):
         self.config, self.moves, self.estop_limit_us, self.pair_limit_us = config, moves, estop_limit_us, pair_limit_us
+        self.exit_clears = exit_clears  # The bus loses the frames that a program sent just before it exited.
         self.frames = sorted(frames, key=lambda frame: frame.t_us)
         self.events = sorted(events, key=lambda event: event.t_us)
         self.finished_us = finished_us or (self.frames[-1].t_us if self.frames else 0)

@@ -29,11 +29,11 @@ class Skip(unittest.SkipTest):
     """Cannot be tested here; the text says what is missing."""
 
 
-def scenario(title, seconds=5):
-    """`seconds`: roughly how long it takes; the longest start first."""
+def scenario(title, seconds=5, native=""):
+    """`seconds`: the approximate duration; the longest start first. `native`: why virtual time cannot show it, as in pytest_virtual.py."""
 
     def register(function):
-        function.scenario = title, seconds
+        function.scenario, function.native = (title, seconds), native
         REGISTRY[function.__name__] = (title, seconds, function)
         return function
 
