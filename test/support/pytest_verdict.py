@@ -308,6 +308,9 @@ class Run(verdict.Session):
         if isinstance(answer, str):
             return verdict.Attempt([verdict.Failure(answer, verdict.CRASH)])
         reports = [self.config.hook.pytest_report_from_serializable(config=self.config, data=data) for data in answer.pop("reports")]
+        for report in reports:
+            if isinstance(report.longrepr, list):  # The place and the reason of a skipped test were a tuple before JSON.
+                report.longrepr = tuple(report.longrepr)
         failures, claims, stalls = ([tuple(one) for report in reports for one in getattr(report, what)] for what in ("failures", "claims", "stalls"))
         if items[0].get_closest_marker("exact"):
             failures = [(text, verdict.RULE) for text, *_ in failures]

@@ -104,6 +104,8 @@ FAULTS = (
         "pass",
         "test_native_test_is_left_out_of_virtual_time",
     ),
+    ("a test that is skipped inside ends the run", "tuple(report.longrepr)", "report.longrepr", "test_skipped_test_inside_is_named_with_its_reason"),
+    ("no call is late", 'os.environ["IWHEEL_DELAYS"] = ', "_ = ", "test_delays_reach_the_tests_inside"),
     (
         "the rest of a sample is the sample",
         "(item in chosen) != (config.option.sample > 0)",
@@ -634,6 +636,15 @@ class Virtual(Made):
         ran = self.virtual(self.TWO.format("pass"), kernel="raise RuntimeError('no flex')")
         self.assertEqual((77, "0 passed, 0 failed, 2 skipped", []), self.results(ran), ran.lines)
         self.assertIn("skip: test_it.py::test_two: no virtual time: no flex", ran.lines)
+
+    def test_skipped_test_inside_is_named_with_its_reason(self):
+        ran = self.virtual(self.TWO.format('pytest.skip("no wheel")'))
+        self.assertEqual((0, "1 passed, 0 failed, 1 skipped"), (ran.status, ran.last), ran.lines)
+        self.assertIn("skip: test_it.py::test_one: no wheel", ran.lines)
+
+    def test_delays_reach_the_tests_inside(self):
+        ran = self.virtual('def test_one():\n    note(os.environ.get("IWHEEL_DELAYS", "none"))\n', "--delays", "7")
+        self.assertEqual((0, "1 passed, 0 failed, 0 skipped", ["7"]), self.results(ran), ran.lines)
 
     def test_native_test_is_left_out_of_virtual_time(self):
         tests = '@pytest.mark.native("a race")\n' + self.TWO.format("pass")

@@ -19,13 +19,14 @@ sys.path.append(os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__f
 from bus import Bus, now_us
 from client import Client
 from judge import Judge
-from judge_log import PAIR_REAL_US, Config, Event
+from judge_log import ESTOP_US, PAIR_REAL_US, Config, Event
 from verdict import die_with_parent
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 SERVICE_NICE = -10
 PACE = {"slow": 1}  # how many times slower than documented telemetry comes, where time is virtual: test/kernel/catalogue.py
 WORDS = 800  # of a program's, beside a failure
+DELAYED_US = 6_000  # with --delays: three system calls between the button and the zero pair begin 2 ms late
 RESTART_US = 300_000  # row 25: it answers, and so sends its zeros, this soon after a restart
 DEFAULTS = {"wheels": {"setpoint_type": 1, "current_role": "limit", "track_mm": 540}, "drive": {}, "northbound": {"mode": "0600"}}
 
@@ -98,6 +99,25 @@ def as_a_service():
         os.setpriority(os.PRIO_PROCESS, 0, SERVICE_NICE)
 
 
+def hook_library(build):
+    """The library that delays system calls of a program and lets them hang: hook.c."""
+    path = os.path.join(build, "test", "system", "libiwheel_hook.so")
+    if not os.path.exists(path):  # The loader would only print a warning.
+        raise FileNotFoundError(f"{path} is missing; build it first: cmake --build {build} --target iwheel_hook")
+    return path
+
+
+def delayed(build):
+    """In a child, before it becomes a program: with pytest's --delays, its system calls begin 0 to 2 ms late at random."""
+    if "IWHEEL_DELAYS" in os.environ:
+        os.environ["LD_PRELOAD"] = hook_library(build)
+
+
+def estop_limit_us():
+    """The limit of the 99th percentile of the time from the e-stop to the zero pair."""
+    return ESTOP_US + (DELAYED_US if "IWHEEL_DELAYS" in os.environ else 0)
+
+
 class Process:
     """A child whose output goes to a file."""
 
@@ -165,7 +185,7 @@ class Sim:
             *rig.sim_arguments(),
             *extra,
         ]
-        self.process = Process(command, rig.path("sim.out"))
+        self.process = Process(command, rig.path("sim.out"), lambda: delayed(rig.build))
         self.control = wait_connect(rig.path("control"), self.process)
         self.lines = self.control.makefile("r")
 
@@ -310,7 +330,13 @@ class Rig:
     def start_gateway(self, *extra, setup=None, wheels=True, restart_hold=False):
         """Starts it and waits until it answers, and with `wheels` until both are heard. Returns the milliseconds to the answer."""
         begin_us = now_us()
-        self.gateway = Process(self.gateway_command(*extra), self.path("gateway.out"), setup)
+
+        def prepare():
+            delayed(self.build)
+            if setup:
+                setup()
+
+        self.gateway = Process(self.gateway_command(*extra), self.path("gateway.out"), prepare)
         self.processes.append(self.gateway)
         self.timeline.append(Event(begin_us, "start"))
         if restart_hold:
@@ -413,7 +439,7 @@ class Rig:
             self.timeline,
             moves=moves,
             finished_us=finished_us,
-            **{"pair_limit_us": PAIR_REAL_US, "exit_clears": self.exit_clears, **options},
+            **{"pair_limit_us": PAIR_REAL_US, "estop_limit_us": estop_limit_us(), "exit_clears": self.exit_clears, **options},
         )
         judge.judge()
         return judge
