@@ -25,8 +25,8 @@ def presses(run):
     """[(microseconds from the e-stop to zero, whether the machine stalled right then)] of row 11."""
     found = []
     for name, attempt in run.passed.items():
-        told = [report.data for report in attempt.data if report.when == "call"] if "::row11" in name else []
-        for at_us, latency_us in (pair for data in told for pair in data.get("latencies", ())):
+        found_in = [report.data for report in attempt.data if report.when == "call"] if "::row11" in name else []
+        for at_us, latency_us in (pair for data in found_in for pair in data.get("latencies", ())):
             stalled = run.measured(attempt, at_us - ESTOP_AROUND_US, at_us + latency_us + ESTOP_AROUND_US)
             found.append((latency_us, bool(stalled)))
     return found
