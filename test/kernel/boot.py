@@ -13,7 +13,7 @@ from harness import die_with_parent
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 VIRTUAL_NICE = 5
-MEMORY_ELSEWHERE = ("TMPDIR", "TMP", "TEMP")  # There the kernel would keep its memory, on a disk perhaps; without them it is in /dev/shm.
+MEMORY_ELSEWHERE = ("TMPDIR", "TMP", "TEMP")  # Folders in which the kernel would place its memory, perhaps on a disk; without them it is in /dev/shm.
 
 
 def find_kernel(install=True):
@@ -58,7 +58,7 @@ class Boot:
                 cwd=folder,
                 env={key: value for key, value in os.environ.items() if key not in MEMORY_ELSEWHERE},
             )
-        self.taken, self.cpu_s = 0, 0
+        self.read_bytes, self.cpu_s = 0, 0
 
     def prepare(self):
         """In the child: sets processors and priority. Virtual time has a low priority; real time has a high one, if permitted."""
@@ -95,10 +95,10 @@ class Boot:
     def results(self):
         """Results that came since the last call."""
         with open(self.path("results"), encoding="utf-8") as file:
-            file.seek(self.taken)
+            file.seek(self.read_bytes)
             lines = file.read()
         whole = lines[: lines.rfind("\n") + 1]
-        self.taken += len(whole.encode())
+        self.read_bytes += len(whole.encode())
         return [json.loads(line) for line in whole.splitlines()]
 
     def running(self):
@@ -109,7 +109,7 @@ class Boot:
         return time.monotonic() - self.began
 
     def stall_as_asked(self):
-        """A test may ask for a stalled machine, by NAME.stall with the seconds in it: the kernel's process stands still so long."""
+        """A test may ask for a stalled machine, by NAME.stall with the seconds in it: the kernel's process is stopped for that time."""
         try:
             with open(self.path("stall"), encoding="ascii") as file:
                 seconds = float(file.read())
