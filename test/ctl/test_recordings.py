@@ -73,9 +73,9 @@ class Clock(unittest.TestCase):
                 with open(os.path.join(folder, name), "w", encoding="utf-8") as file:
                     file.write(log)
             config = os.path.join(GOLDEN, "..", "..", "share", "gateway.conf")
-            _, told, _ = run("replay", path, "--config", config)
+            _, printed, _ = run("replay", path, "--config", config)
             _, wanted, _ = run("replay", os.path.join(folder, "b.log"), "--config", config)
-            self.assertEqual(*([line.split(None, 1)[-1] for line in said.splitlines()[1:]] for said in (told, wanted)))
+            self.assertEqual(*([line.split(None, 1)[-1] for line in said.splitlines()[1:]] for said in (printed, wanted)))
 
     def test_clock_set_while_recording_invents_nothing(self):
         for name, clock in self.CLOCKS.items():
@@ -394,7 +394,7 @@ class Decode(unittest.TestCase):
                 return usage.ru_maxrss
 
         block = lines(*["100#000F0001"] * 1000)
-        self.assertLess(resident_kB(300) - resident_kB(1), 3000)  # Of 11 MB.
+        self.assertLess(resident_kB(300) - resident_kB(1), 3000)  # The recording has 11 MB.
 
     def test_json_carries_what_the_csv_carries(self):
         text = lines(
@@ -598,7 +598,7 @@ class Why(unittest.TestCase):
 
 
 class Learn(unittest.TestCase):
-    """Drives of made-up controllers, a frame every 20 ms for each wheel, telemetry as told."""
+    """Drives of made-up controllers, a frame every 20 ms for each wheel, telemetry as specified."""
 
     def story(self, types=(3, 3), current=lambda speed: 1500, sign=(1, 1), raw=(200, 20), offset=(20, 20), gear=1.0, extra=b"", mark=""):
         text = []

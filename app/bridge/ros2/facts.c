@@ -125,14 +125,14 @@ static bool is_confirmed(const iwc_message_t *assumptions, const char *item) {
 static void tell_contradiction(const iwc_message_t *assumptions, const char *item, ros_machine_t *machine) {
     char path[48];
     char reason[160];
-    char cure[160];
+    char fix[160];
     (void)snprintf(path, sizeof path, "%s.reason", item);
     (void)iwc_text(assumptions, path, reason, sizeof reason);
     (void)snprintf(path, sizeof path, "%s.disabled", item);
-    (void)iwc_text(assumptions, path, cure, sizeof cure);
+    (void)iwc_text(assumptions, path, fix, sizeof fix);
     const size_t used = strlen(machine->contradicted);
     (void)snprintf(machine->contradicted + used, sizeof machine->contradicted - used, "%s%s: %s; %s",
-                   (used > 0) ? ". " : "", item, reason, cure);
+                   (used > 0) ? ". " : "", item, reason, fix);
 }
 
 void ros_facts_read_assumptions(const iwc_message_t *message, ros_machine_t *machine) {

@@ -73,7 +73,7 @@ void frame_print(const char *time_text, const candump_t *frame, const decoded_t 
 }
 
 /// Reads hexadecimal text into bytes. Returns their number.
-static uint8_t take_data(const char *text, uint8_t data[IW_CAN_DATA_MAX]) {
+static uint8_t read_data(const char *text, uint8_t data[IW_CAN_DATA_MAX]) {
     uint8_t length = 0;
     while (text != NULL && length < IW_CAN_DATA_MAX && text[0] != '\0' && text[1] != '\0') {
         const char pair[] = {text[0], text[1], '\0'};
@@ -83,8 +83,8 @@ static uint8_t take_data(const char *text, uint8_t data[IW_CAN_DATA_MAX]) {
     return length;
 }
 
-static bool has_flag(const json_t *told, const char *wanted) {
-    const json_t *flags = json_object_get(told, "flags");
+static bool has_flag(const json_t *json, const char *wanted) {
+    const json_t *flags = json_object_get(json, "flags");
     for (size_t i = 0; i < json_array_size(flags); i++) {
         const char *flag = json_string_value(json_array_get(flags, i));
         if (flag != NULL && strcmp(flag, wanted) == 0) {
@@ -94,14 +94,14 @@ static bool has_flag(const json_t *told, const char *wanted) {
     return false;
 }
 
-candump_t frame_from_json(const json_t *told, int64_t *out_at_us) {
-    const char *kind = json_string_value(json_object_get(told, "kind"));
-    candump_t frame = {.id = (uint32_t)json_integer_value(json_object_get(told, "id")) & CANDUMP_ID_MASK,
+candump_t frame_from_json(const json_t *json, int64_t *out_at_us) {
+    const char *kind = json_string_value(json_object_get(json, "kind"));
+    candump_t frame = {.id = (uint32_t)json_integer_value(json_object_get(json, "id")) & CANDUMP_ID_MASK,
                        .mark = (kind != NULL && strcmp(kind, "echo") == 0) ? CANDUMP_SENT : CANDUMP_RECEIVED,
-                       .extended = has_flag(told, "extended"),
-                       .remote = has_flag(told, "remote"),
-                       .fd = has_flag(told, "fd")};
-    frame.length = take_data(json_string_value(json_object_get(told, "data")), frame.data);
-    *out_at_us = json_integer_value(json_object_get(told, "t_us"));
+                       .extended = has_flag(json, "extended"),
+                       .remote = has_flag(json, "remote"),
+                       .fd = has_flag(json, "fd")};
+    frame.length = read_data(json_string_value(json_object_get(json, "data")), frame.data);
+    *out_at_us = json_integer_value(json_object_get(json, "t_us"));
     return frame;
 }

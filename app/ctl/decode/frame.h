@@ -24,6 +24,6 @@ void frame_add_id(const candump_t *frame, iwn_text_t *line);
 void frame_print(const char *time_text, const candump_t *frame, const decoded_t *decoded);
 
 /// Reads a frame that the gateway sent. Its `time_us` is 0; `*out_at_us` is its time on the monotonic clock.
-candump_t frame_from_json(const json_t *told, int64_t *out_at_us);
+candump_t frame_from_json(const json_t *json, int64_t *out_at_us);
 
 #endif

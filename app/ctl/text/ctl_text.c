@@ -137,13 +137,13 @@ const char *text_side(unsigned side) {
     return (side == IW_LEFT) ? "left" : "right";
 }
 
-size_t text_cut(const char *text, size_t room) {
+size_t text_cut(const char *text, size_t columns) {
     const size_t length = strlen(text);
-    size_t cut = room;
-    while (cut > 0 && length > room && text[cut] != ' ') {
+    size_t cut = columns;
+    while (cut > 0 && length > columns && text[cut] != ' ') {
         cut--;
     }
-    return (length <= room) ? length : (cut == 0) ? room : cut;
+    return (length <= columns) ? length : (cut == 0) ? columns : cut;
 }
 
 void text_when(json_int_t wall_us, char out[TEXT_CELL]) {
@@ -183,9 +183,9 @@ void paper_label(const paper_t *self, const char *label) {
 
 void paper_wrap(const paper_t *self, const char *label, tone_t tone, const char *text) {
     char piece[PAPER_WIDTH];
-    const size_t room = PAPER_WIDTH - PAPER_LABEL;
+    const size_t columns = PAPER_WIDTH - PAPER_LABEL;
     do {
-        const size_t cut = text_cut(text, room);
+        const size_t cut = text_cut(text, columns);
         memcpy(piece, text, cut);
         piece[cut] = '\0';
         paper_label(self, label);

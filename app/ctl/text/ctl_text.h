@@ -63,8 +63,8 @@ const char *text_word(const json_t *object, const char *field);
 /// Returns "left" or "right".
 const char *text_side(unsigned side);
 
-/// Returns the length of the text that fits in a line of `room` columns; it is broken between words if possible.
-size_t text_cut(const char *text, size_t room);
+/// Returns the length of the text that fits in a line of `columns` columns; it is broken between words if possible.
+size_t text_cut(const char *text, size_t columns);
 
 /// Writes the local date and time; "--" if there are none.
 void text_when(json_int_t wall_us, char out[TEXT_CELL]);

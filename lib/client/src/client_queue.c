@@ -74,9 +74,9 @@ static bool admit_line(iwc_t *self, iwc_span_t line) {
 }
 
 bool iwc_queue_admit(iwc_t *self) {
-    size_t looked = self->whole;
+    size_t searched = self->whole;
     for (;;) {
-        const char *newline = memchr(self->in + looked, '\n', self->end - looked);
+        const char *newline = memchr(self->in + searched, '\n', self->end - searched);
         if (newline == NULL) {
             return self->end - self->whole <= IWC_LINE_MAX;
         }
@@ -84,8 +84,8 @@ bool iwc_queue_admit(iwc_t *self) {
         if (!admit_line(self, line)) {
             return false;
         }
-        looked = (size_t)(newline - self->in) + 1U;
-        self->whole = looked;
+        searched = (size_t)(newline - self->in) + 1U;
+        self->whole = searched;
     }
 }
 
@@ -149,7 +149,7 @@ typedef struct {
 } survivors_t;
 
 /// Returns true if a line stays. The caller calls it for each line, from the newest to the oldest.
-static bool keep(iwc_t *self, survivors_t *survivors, iwc_span_t line) {
+static bool retain(iwc_t *self, survivors_t *survivors, iwc_span_t line) {
     if (line.at[0] == STRUCK) {
         return false;
     }
@@ -178,7 +178,7 @@ void iwc_queue_thin(iwc_t *self) {
     for (size_t end = self->whole; end > self->begin;) {
         const char *before = memrchr(self->in + self->begin, '\n', end - 1U - self->begin);
         const size_t from = (before != NULL) ? (size_t)(before - self->in) + 1U : self->begin;
-        if (keep(self, &survivors, (iwc_span_t){self->in + from, end - 1U - from})) {
+        if (retain(self, &survivors, (iwc_span_t){self->in + from, end - 1U - from})) {
             to -= end - from;
             memmove(self->in + to, self->in + from, end - from);
         }

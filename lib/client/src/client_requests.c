@@ -32,7 +32,7 @@ static bool is_harmless(iwc_span_t cmd) {
 /// Returns a free entry for the id of one more drive command; NULL: none. The limit prevents a gateway that hung from
 /// receiving many old commands when it resumes.
 static int64_t *place_to_drive(iwc_t *self) {
-    for (int look = 0; look < 2; look++) {
+    for (int attempt = 0; attempt < 2; attempt++) {
         for (size_t i = 0; i < IWC_DRIVES_MAX; i++) {
             if (self->driven[i] == 0) {
                 return &self->driven[i];

@@ -217,8 +217,8 @@ iwn_text_t iwn_text_begin(char *data, size_t size) {
 }
 
 void iwn_text_span(iwn_text_t *self, const char *text, size_t length) {
-    const size_t room = self->size - self->length - 1U;
-    const size_t fits = (length < room) ? length : room;
+    const size_t space = self->size - self->length - 1U;
+    const size_t fits = (length < space) ? length : space;
     memcpy(&self->data[self->length], text, fits);
     self->length += fits;
     self->data[self->length] = '\0';
