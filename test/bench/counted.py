@@ -18,8 +18,8 @@ COMPILERS = ("gcc", "clang")
 ARM_CPUS = ("cortex-m4", "cortex-m0plus")
 # Instructions for a line.
 READ_LIMITS = {
-    "libiwheel-client, an event `state`": 67000,
-    "the same, and its fields": 109000,
+    "libiwheel-client, an event `state`": 65000,
+    "the same, and its fields": 107000,
     "iwheelctl decode": 4300,
     "iwheelctl decode --csv": 4600,
     "iwheelctl --json decode": 4700,

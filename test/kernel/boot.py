@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Boots the kernel of build_kernel as an ordinary process, with the host's files as its root, and ends it for sure."""
+"""Boots the kernel of build_kernel as an ordinary process, with the host's files as its root, and always ends it."""
 
 import contextlib
 import json
@@ -28,7 +28,7 @@ def find_kernel(install=True):
             last = line.rstrip("\n")
             print(f"  {last}", flush=True)
     if child.returncode != 0:
-        raise RuntimeError("the kernel could not be built; test/kernel/build_kernel prints the reason")
+        raise RuntimeError("the kernel could not be built; its reason: test/kernel/build_kernel")
     return last
 
 
@@ -61,12 +61,12 @@ class Boot:
         self.read_bytes, self.cpu_s = 0, 0
 
     def prepare(self):
-        """In the child: where it may run. Virtual time makes way for everything else; real time waits for nobody, if permitted."""
+        """In the child: sets processors and priority. Virtual time has a low priority; real time has a high one, if permitted."""
         die_with_parent()
         os.sched_setaffinity(0, self.processors)
         if self.plan["virtual"]:
             os.nice(VIRTUAL_NICE)
-        if self.plan["virtual"] or self.plan["group"] == "starved":  # which would use up what is allowed, and be stopped for it
+        if self.plan["virtual"] or self.plan["group"] == "starved":  # With a real-time priority it would use up its share and be stopped.
             return
         with contextlib.suppress(PermissionError):  # then the witness decides what can be judged
             os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(1))
@@ -126,7 +126,7 @@ class Boot:
             os.killpg(self.child.pid, signal.SIGKILL)
 
     def end(self):
-        """Kills the rest of it; stores the seconds of processor time that it and its processes used."""
+        """Kills its remaining processes; stores the processor time of all of them."""
         self.kill()
         _, status, usage = os.wait4(self.child.pid, 0)
         self.child.returncode = os.waitstatus_to_exitcode(status)

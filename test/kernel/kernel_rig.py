@@ -155,6 +155,8 @@ def remove_marker(interface):
 class VcanRig(GpioButton, Rig):
     """Gateway, simulated wheels and recorder on one vcan interface; the e-stop is a GPIO line."""
 
+    exit_clears = False
+
     ids = ()  # ids that the recorder receives; empty: all
 
     def prepare(self):
@@ -231,6 +233,7 @@ class SlcanRig(GpioButton, Rig):
     """
 
     queue_length = 4
+    exit_clears = False
 
     def prepare(self):
         self.adapter = None

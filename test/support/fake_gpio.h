@@ -19,12 +19,12 @@ typedef struct {
     bool is_input;
     bool pulled_up;
     bool both_edges;
-    unsigned buffer_size;   ///< Requested size of the kernel's edge buffer.
-    unsigned offset; ///< Requested offset.
-    int open;        ///< Chips that are open.
-    int requested;   ///< Lines that are requested.
-    int reads;       ///< Reads of edges.
-    int ends[2];     ///< A pipe: the first is the line's descriptor.
+    unsigned buffer_size; ///< Requested size of the kernel's edge buffer.
+    unsigned offset;      ///< Requested offset.
+    int open;             ///< Chips that are open.
+    int requested;        ///< Lines that are requested.
+    int reads;            ///< Reads of edges.
+    int ends[2];          ///< A pipe: the first is the line's descriptor.
 } fake_gpio_t;
 
 extern fake_gpio_t fake_gpio;

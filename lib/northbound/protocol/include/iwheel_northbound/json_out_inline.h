@@ -54,9 +54,10 @@ IWN_OUT_INLINE void iwn_out_int(iwn_out_t *self, const char *name, int64_t value
 
 IWN_OUT_INLINE void iwn_out_bool(iwn_out_t *self, const char *name, bool value) {
     char *const at = iwn_out_begin(self, iwn_span(name), value ? 4U : 5U);
-    if (at != NULL) {
-        memcpy(at, value ? "true" : "fals", 4U);
-        at[value ? 3U : 4U] = 'e';
+    if (at != NULL && value) {
+        memcpy(at, "true", 4U);
+    } else if (at != NULL) {
+        memcpy(at, "false", 5U);
     }
 }
 
