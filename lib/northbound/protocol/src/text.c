@@ -182,19 +182,22 @@ static char *digits_32(uint32_t number, char *end) {
     return end;
 }
 
-char *iwn_digits(int64_t number, char *end) {
-    uint64_t rest = (number < 0) ? 0U - (uint64_t)number : (uint64_t)number;
-    while (rest > UINT32_MAX) {
-        const uint64_t high = rest / 1000000000U;
+char *iwn_digits_unsigned(uint64_t number, char *end) {
+    while (number > UINT32_MAX) {
+        const uint64_t high = number / 1000000000U;
         char *const begin = end - 9;
-        char *at = digits_32((uint32_t)(rest - high * 1000000000U), end);
+        char *at = digits_32((uint32_t)(number - high * 1000000000U), end);
         while (at > begin) {
             *--at = '0';
         }
         end = begin;
-        rest = high;
+        number = high;
     }
-    end = digits_32((uint32_t)rest, end);
+    return digits_32((uint32_t)number, end);
+}
+
+char *iwn_digits(int64_t number, char *end) {
+    end = iwn_digits_unsigned((number < 0) ? 0U - (uint64_t)number : (uint64_t)number, end);
     if (number < 0) {
         *--end = '-';
     }
@@ -218,11 +221,18 @@ void iwn_text_add(iwn_text_t *self, const char *text) {
     iwn_text_span(self, text, strlen(text));
 }
 
-void iwn_text_int(iwn_text_t *self, int64_t number) {
+void iwn_text_unsigned(iwn_text_t *self, uint64_t number) {
     char digits[IWN_DIGITS_MAX];
     const char *const end = digits + sizeof digits;
-    const char *const begin = iwn_digits(number, digits + sizeof digits);
+    const char *const begin = iwn_digits_unsigned(number, digits + sizeof digits);
     iwn_text_span(self, begin, (size_t)(end - begin));
+}
+
+void iwn_text_int(iwn_text_t *self, int64_t number) {
+    if (number < 0) {
+        iwn_text_add(self, "-");
+    }
+    iwn_text_unsigned(self, (number < 0) ? 0U - (uint64_t)number : (uint64_t)number);
 }
 
 void iwn_text_hex(iwn_text_t *self, uint32_t number, unsigned digits) {
