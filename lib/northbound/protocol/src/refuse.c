@@ -65,9 +65,9 @@ static void say_not_armed(wording_t *self) {
 
 static void say_estop(wording_t *self) {
     SAY(self, "the e-stop ", self->context->estop,
-        (self->context->estop_answer < 0)
-            ? " cannot be read, which counts as pressed; check its wire, then: iwheelctl reset"
-            : " is pressed; release the button, then: iwheelctl reset");
+        (self->context->estop_answer < 0) ? " cannot be read, which counts as pressed; check its wire"
+                                          : " is pressed; release the button",
+        iwn_why_then(IW_CAUSE_ESTOP_LINE));
 }
 
 static void say_lost(wording_t *self) {
