@@ -42,7 +42,7 @@ typedef struct {
 } writer_t;
 
 /// Stores the errno of a failed call, because stdio stores only that there was one.
-static void keep_error(writer_t *self, bool failed) {
+static void store_error(writer_t *self, bool failed) {
     if (failed && self->error == 0) {
         self->error = (errno != 0) ? errno : EIO;
     }
@@ -50,7 +50,7 @@ static void keep_error(writer_t *self, bool failed) {
 
 /// Writes the contents of `line`.
 static void put_line(writer_t *self, FILE *file, size_t length) {
-    keep_error(self, fwrite(self->line, 1, length, file) != length);
+    store_error(self, fwrite(self->line, 1, length, file) != length);
 }
 
 static void write_entry(writer_t *self, const blackbox_entry_t *entry) {
@@ -99,8 +99,8 @@ static bool is_called(const writer_t *self, int timeout_ms) {
 }
 
 static void flush(writer_t *self) {
-    keep_error(self, fflush(self->frames_file) != 0);
-    keep_error(self, fflush(self->events_file) != 0);
+    store_error(self, fflush(self->frames_file) != 0);
+    store_error(self, fflush(self->events_file) != 0);
 }
 
 /// Writes the entries after the stop, until it is over or the next order waits.
@@ -114,16 +114,16 @@ static void follow(writer_t *self) {
 }
 
 static void finish_file(writer_t *self, FILE *file) {
-    keep_error(self, fflush(file) != 0);
-    keep_error(self, fsync(fileno(file)) != 0);
-    keep_error(self, fclose(file) != 0);
+    store_error(self, fflush(file) != 0);
+    store_error(self, fsync(fileno(file)) != 0);
+    store_error(self, fclose(file) != 0);
 }
 
 static void write_config(writer_t *self, int directory, const char *stem) {
     FILE *file = gw_box_files_create(directory, stem, ".conf");
-    keep_error(self, file == NULL);
+    store_error(self, file == NULL);
     if (file != NULL) {
-        keep_error(self, fputs(self->config->config, file) < 0);
+        store_error(self, fputs(self->config->config, file) < 0);
         finish_file(self, file);
     }
 }
@@ -163,7 +163,7 @@ static int write_files(writer_t *self, int directory, uint32_t number) {
     }
     self->frames_file = (self->error == 0) ? gw_box_files_create(directory, stem, ".log") : NULL;
     self->events_file = (self->frames_file != NULL) ? gw_box_files_create(directory, stem, ".jsonl") : NULL;
-    keep_error(self, self->events_file == NULL);
+    store_error(self, self->events_file == NULL);
     if (self->events_file != NULL) {
         fill_files(self);
         finish_file(self, self->events_file);

@@ -129,7 +129,7 @@ iwc_result_t iwc_ask(iwc_t *self, const char *request, int timeout_ms, iwc_messa
     if (iwc_truth(&reply, "ok").value == 1) {
         return IWC_OK;
     }
-    iwc_keep_refusal(self, &reply);
+    iwc_store_refusal(self, &reply);
     return IWC_REFUSED;
 }
 

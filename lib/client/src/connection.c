@@ -152,7 +152,7 @@ static void begin(iwc_t *self) {
     self->path[0] = '\0';
 }
 
-void iwc_keep_refusal(iwc_t *self, const iwc_message_t *reply) {
+void iwc_store_refusal(iwc_t *self, const iwc_message_t *reply) {
     (void)iwc_text(reply, "error", self->error, sizeof self->error);
     (void)iwc_text(reply, "message", self->reason, sizeof self->reason);
 }
@@ -171,7 +171,7 @@ static iwc_result_t greet(iwc_t *self, int64_t deadline_us) {
         }
     }
     if (result == IWC_OK && iwc_truth(&hello, "ok").known && iwc_truth(&hello, "ok").value == 0) {
-        iwc_keep_refusal(self, &hello);
+        iwc_store_refusal(self, &hello);
         result = IWC_REFUSED;
     } else if (result == IWC_OK && !iwc_is(&hello, "event", "hello")) {
         result = IWC_GARBLED;

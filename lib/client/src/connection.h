@@ -67,7 +67,7 @@ iwc_result_t iwc_put(iwc_t *self, const char *line, size_t length, int64_t deadl
 void iwc_end(iwc_t *self, iwc_result_t result);
 
 /// Stores name and message of a refusal for `iwc_error` and `iwc_reason`.
-void iwc_keep_refusal(iwc_t *self, const iwc_message_t *reply);
+void iwc_store_refusal(iwc_t *self, const iwc_message_t *reply);
 
 /// Sends a stop request through a connection of its own, to one of the gateway's two sockets: client_stop.c.
 iwc_result_t iwc_stop_by(iwc_t *self, const char *path, const char *request, int timeout_ms);

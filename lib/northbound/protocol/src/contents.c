@@ -49,6 +49,12 @@ static void write_motion(const iw_snapshot_t *seen, iw_side_t side, iwn_out_t *j
     iwn_write_age("speed_age_ms", seen->at_us, wheel->speed_us, json);
 }
 
+/// A controller has no instruction for this division, and its library's for signed numbers is large.
+static int64_t mm_of_nm(int64_t nm) {
+    const uint64_t mm = ((nm < 0) ? 0U - (uint64_t)nm : (uint64_t)nm) / 1000000U;
+    return (nm < 0) ? -(int64_t)mm : (int64_t)mm;
+}
+
 static void write_condition(const iw_snapshot_t *seen, iw_side_t side, iwn_out_t *json) {
     const iw_snapshot_wheel_t *wheel = &seen->wheel[side];
     const iw_codec_status_t *status = &wheel->told->status;
@@ -61,7 +67,7 @@ static void write_condition(const iw_snapshot_t *seen, iw_side_t side, iwn_out_t
     iwn_out_known32(json, "temperature_degC", warm, status->temperature_degC);
     iwn_out_known32(json, "cpu_percent", cpu, status->cpu_percent);
     iwn_out_known(json, "ticks", ever, wheel->ticks);
-    iwn_out_known(json, "distance_mm", ever && is_distance_known(seen), wheel->ticks * wheel->nm_per_tick / 1000000);
+    iwn_out_known(json, "distance_mm", ever && is_distance_known(seen), mm_of_nm(wheel->ticks * wheel->nm_per_tick));
     iwn_write_age("status_age_ms", seen->at_us, wheel->status_us, json);
     iwn_out_int(json, "reboots", wheel->reboots);
     iwn_out_open(json, "valid", '{');

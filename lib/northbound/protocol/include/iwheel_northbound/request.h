@@ -56,11 +56,11 @@ bool iwn_cmd_stops(iwn_cmd_t cmd);
 /// Type of the id of a request.
 typedef enum { IWN_ID_NONE = 0, IWN_ID_NUMBER, IWN_ID_TEXT } iwn_id_kind_t;
 
-/// Id that the reply repeats.
+/// Id that the reply repeats. The order of the members has the least padding.
 typedef struct {
-    iwn_id_kind_t kind;              ///< Type of the id, or none.
     int64_t number;                  ///< As sent.
     char text[IWN_ID_TEXT_MAX + 1U]; ///< As sent.
+    iwn_id_kind_t kind;              ///< Type of the id, or none.
 } iwn_id_t;
 
 /// Only the fields of its `cmd` are valid. Numbers are as sent: any 64-bit integer.

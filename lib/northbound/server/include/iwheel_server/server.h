@@ -25,15 +25,15 @@
 /// Shortest interval between reports of the fault `rolling`: clients store faults, and people push a walker by hand.
 #define IWN_ROLLING_FAULT_US 60000000U
 
-/// Data of one client in the protocol.
+/// Data of one client in the protocol. The order of the members has the least padding.
 typedef struct {
     iw_client_t id;               ///< Never reused for another connection.
+    uint32_t rate_hz;             ///< Rate of the periodic events.
+    iw_time_us_t next_us;         ///< Time of the next periodic event.
     bool watches_only;            ///< The client may only watch, stop and e-stop.
     bool arming;                  ///< An accepted arm request of it has no reply yet.
     bool due;                     ///< A periodic event is due in this cycle.
     uint8_t topics;               ///< Bit mask of the watched topics (iwn_topic_t).
-    uint32_t rate_hz;             ///< Rate of the periodic events.
-    iw_time_us_t next_us;         ///< Time of the next periodic event.
     char name[IWN_NAME_MAX + 1U]; ///< Name from arm; empty if there is none.
 } iwn_client_t;
 
