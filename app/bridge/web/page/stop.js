@@ -79,7 +79,7 @@ function keepStopInSight() {
 
 // What is below or beside the bar can be scrolled out of it.
 function makeRoomForStop() {
-  const bar = $("bar"), column = bar.offsetWidth < innerWidth;
+  const bar = $("bar"), column = bar.offsetWidth < document.documentElement.clientWidth; // innerWidth has the scrollbar, too.
   document.documentElement.style.setProperty("--bar-b", column ? "0px" : `${bar.offsetHeight}px`);
   document.documentElement.style.setProperty("--bar-r", column ? `${bar.offsetWidth}px` : "0px");
   keepStopInSight();
