@@ -193,7 +193,7 @@ static void choose(survey_t *survey, int directory, const gw_box_room_t *room, b
     for (size_t i = 0; i < survey->recordings && (survey->left > room->recordings || survey->bytes > room->bytes);
          i++) {
         found_t *recording = &survey->file[i];
-        const bool stays = recording->removed || recording->number >= room->below;
+        const bool stays = recording->removed || recording->number >= room->below || recording->number == room->running;
         if (!stays && !(harmless_only && was_in_motion(directory, recording))) {
             recording->removed = true;
             survey->bytes -= recording->bytes;
@@ -232,13 +232,26 @@ void gw_box_files_rotate(int directory, const gw_box_room_t *room) {
     } while (thin_out(survey, directory, room) > 0U && survey->partial);
 }
 
-bool gw_box_files_drop_oldest(int directory, uint32_t below, bool in_motion) {
+bool gw_box_files_drop_oldest(int directory, const gw_box_room_t *limits) {
     survey_t *const survey = survey_directory(directory);
     if (survey->recordings == 0U) {
         return false;
     }
-    const gw_box_room_t room = {survey->recordings - 1U, UINT64_MAX, below, in_motion};
+    const gw_box_room_t room = {survey->recordings - 1U, UINT64_MAX, limits->below, limits->in_motion, limits->running};
     return thin_out(survey, directory, &room) > 0U;
+}
+
+void gw_box_files_limit_requested(int directory, size_t most) {
+    survey_t *const survey = survey_directory(directory);
+    size_t left = most;
+    for (size_t i = survey->recordings; i > 0U; i--) { // The newest first.
+        found_t *recording = &survey->file[i - 1U];
+        if (strcmp(recording->cause, GW_BOX_REQUESTED) == 0) {
+            recording->removed = left == 0U;
+            left -= (left > 0U) ? 1U : 0U;
+        }
+    }
+    visit(directory, take_chosen, survey);
 }
 
 void gw_box_files_reserve(int directory, uint64_t bytes) {
