@@ -365,7 +365,23 @@ def gamepad_deadman(t):
             pass
 
 
-@scenario("the gamepad node as a node: drives by joy, stops when the gamepad sends nothing with the button held", 30)
+@scenario("the gamepad's configuration applies in every namespace: joy_node does not repeat there", 15)
+def gamepad_configuration(t):
+    jazzy = Jazzy(1)
+    code = """
+import rclpy
+rclpy.init()
+for name, parameter in (("joy_node", "autorepeat_rate"), ("iwheel_joystick", "report_timeout")):
+    print(name, rclpy.create_node(name).declare_parameter(parameter, 99.0).value)
+"""
+    config = os.path.join(ROOT, "share", "ros2", "iwheel_bringup", "config", "joystick.yaml")
+    for namespace in ("/", "/w1", "/a/b"):
+        words = [jazzy.python, "-c", code, "--ros-args", "--params-file", config, "-r", f"__ns:={namespace}"]
+        done = subprocess.run(words, env=jazzy.environment, capture_output=True, text=True, timeout=30, check=False)
+        t.check(done.stdout.split() == ["joy_node", "0.0", "iwheel_joystick", "2.0"], f"{namespace}: {done.stdout} {done.stderr[-300:]}")
+
+
+@scenario("the gamepad node as a node: drives by joy, stops when the gamepad reports no change with the button held", 30)
 def gamepad_node(t):
     typed = Typed(t)
     ride = typed.ride
@@ -385,12 +401,14 @@ def gamepad_node(t):
         time.sleep(0.1)
     ride.arm()
     silent_us = now_us()
-    for _ in range(10):
-        report(1, 0.5)
+    for n in range(10):
+        report(1, 0.5 + n / 1000)
         silent_us = now_us()
         time.sleep(0.1)
     t.check(ride.moving(), f"it drives: {node.text()[-300:]}")
-    time.sleep(3.5)
+    for _ in range(35):  # A driver that repeats the last report of a gamepad whose link has died.
+        report(1, 0.509)
+        time.sleep(0.1)
     moved = [t_us for t_us, _, speed in ride.rig.bus.setpoints(silent_us) if speed]
     seconds = (moved[-1] - silent_us) / 1e6 if moved else 0.0
     t.check(1.5 < seconds < 2.8, f"the wheels turned for {seconds:.1f} s after the last report", True, now_us())

@@ -42,15 +42,15 @@ typedef struct {
     uint32_t below;    ///< Only recordings with lower numbers are removed.
     bool in_motion;    ///< Recordings of stops in motion may be removed too, when no other is left.
     uint32_t running;  ///< The recording with this number is still being written, and is not removed; 0: none.
-} gw_box_room_t;
+} gw_box_limits_t;
 
-/// Removes recordings until the rest fits `room`: first those of stops at standstill, then the others, the oldest of
+/// Removes recordings until the rest fits `limits`: first those of stops at standstill, then the others, the oldest of
 /// each kind first. The time grows linearly with the number of files.
-void gw_box_files_rotate(int directory, const gw_box_room_t *room);
+void gw_box_files_rotate(int directory, const gw_box_limits_t *limits);
 
-/// Removes one recording with a number below `room->below`, in the order above. Returns false if there is none. The
-/// limits of `room` do not count.
-bool gw_box_files_drop_oldest(int directory, const gw_box_room_t *room);
+/// Removes one recording with a number below `limits->below`, in the order above. Returns false if there is none.
+/// The sizes in `limits` do not count.
+bool gw_box_files_drop_oldest(int directory, const gw_box_limits_t *limits);
 
 /// Removes the oldest recordings on request until `most` of them are left.
 void gw_box_files_limit_requested(int directory, size_t most);

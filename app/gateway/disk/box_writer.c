@@ -94,8 +94,8 @@ static uint32_t running(const gw_writer_t *self) {
 /// Frees space on a full disk for recording `number`. For a stop at standstill it removes neither the reserve nor the
 /// recording of a stop in motion.
 static bool make_room(const gw_writer_t *self, int directory, uint32_t number) {
-    const gw_box_room_t room = {.below = number, .in_motion = self->in_motion, .running = running(self)};
-    return (self->in_motion && gw_box_files_release(directory)) || gw_box_files_drop_oldest(directory, &room);
+    const gw_box_limits_t limits = {.below = number, .in_motion = self->in_motion, .running = running(self)};
+    return (self->in_motion && gw_box_files_release(directory)) || gw_box_files_drop_oldest(directory, &limits);
 }
 
 /// Reserves the size of a recording of a full ring, within limits.
@@ -119,8 +119,8 @@ static int write_recording(gw_writer_t *self) {
     while ((error == ENOSPC || error == EDQUOT) && make_room(self, directory, number)) {
         error = write_files(self, directory, number);
     }
-    gw_box_files_rotate(directory, &(gw_box_room_t){self->config->keep_stops, GW_BOX_BYTES_MAX, number, self->in_motion,
-                                                    running(self)});
+    gw_box_files_rotate(directory, &(gw_box_limits_t){self->config->keep_stops, GW_BOX_BYTES_MAX, number,
+                                                      self->in_motion, running(self)});
     reserve(self, directory);
     (void)fsync(directory);
     (void)close(directory);

@@ -76,17 +76,16 @@ static bool is_plain(char c) {
 }
 
 /// Reads a machine word at a time. If all bytes are below 0x80, a subtraction borrows only after a byte that is not
-/// plain either.
+/// plain either. With bit 1 inverted, a quote and the control characters are the bytes below 0x21.
 size_t iwn_plain_length(const char *text, size_t length) {
     size_t plain = 0;
     size_t word;
     for (; plain + sizeof word <= length; plain += sizeof word) {
         memcpy(&word, &text[plain], sizeof word);
-        const size_t control = word - IN_EACH(0x20U);
-        const size_t quote = (word ^ IN_EACH(0x22U)) - IN_EACH(1U);
+        const size_t control_or_quote = (word ^ IN_EACH(0x02U)) - IN_EACH(0x21U);
         const size_t backslash = (word ^ IN_EACH(0x5CU)) - IN_EACH(1U);
-        const size_t erase = (word ^ IN_EACH(0x7FU)) - IN_EACH(1U);
-        const size_t odd = (word | control | quote | backslash | erase) & IN_EACH(0x80U);
+        const size_t erase = word + IN_EACH(1U);
+        const size_t odd = (word | control_or_quote | backslash | erase) & IN_EACH(0x80U);
         if (odd != 0U) {
 #if !defined(__OPTIMIZE_SIZE__) && __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
             return plain + (size_t)__builtin_ctzll(odd) / 8U; // The lowest bit belongs to the first such byte.
@@ -182,19 +181,30 @@ static char *digits_32(uint32_t number, char *end) {
     return end;
 }
 
+static uint64_t without_sign(int64_t number) {
+    return (number < 0) ? 0U - (uint64_t)number : (uint64_t)number;
+}
+
+size_t iwn_digits_length(int64_t number) {
+    const uint64_t rest = without_sign(number);
+    size_t length = (number < 0) ? 2U : 1U;
+    for (uint64_t limit = 10U; rest >= limit; limit *= 10U) { // The largest limit has 20 digits and fits.
+        length++;
+    }
+    return length;
+}
+
 char *iwn_digits(int64_t number, char *end) {
-    uint64_t rest = (number < 0) ? 0U - (uint64_t)number : (uint64_t)number;
-    while (rest > UINT32_MAX) {
-        const uint64_t high = rest / 1000000000U;
-        char *const begin = end - 9;
-        char *at = digits_32((uint32_t)(rest - high * 1000000000U), end);
-        while (at > begin) {
-            *--at = '0';
-        }
-        end = begin;
+    uint64_t rest = without_sign(number);
+    bool last = false;
+    while (!last) {
+        last = rest <= UINT32_MAX;
+        const uint64_t high = last ? 0U : rest / 1000000000U;
+        char *const at = digits_32((uint32_t)(rest - high * 1000000000U), end);
+        end = last ? at : end - 9;
+        memset(end, '0', (size_t)(at - end)); // Leading zeros of the lower nine digits.
         rest = high;
     }
-    end = digits_32((uint32_t)rest, end);
     if (number < 0) {
         *--end = '-';
     }
@@ -207,8 +217,8 @@ iwn_text_t iwn_text_begin(char *data, size_t size) {
 }
 
 void iwn_text_span(iwn_text_t *self, const char *text, size_t length) {
-    const size_t room = self->size - self->length - 1U;
-    const size_t fits = (length < room) ? length : room;
+    const size_t space = self->size - self->length - 1U;
+    const size_t fits = (length < space) ? length : space;
     memcpy(&self->data[self->length], text, fits);
     self->length += fits;
     self->data[self->length] = '\0';

@@ -2,7 +2,8 @@
 """Drives by a gamepad with a deadman: topic `joy` in, `cmd_vel` out at 20 Hz.
 
 The node publishes speeds while the deadman button is held and the gamepad has reported a change within `report_timeout` seconds. A wireless gamepad whose
-link has died reports nothing, with the button held or not. A stick that is held still reports nothing either: move it slightly. After the timeout, and
+link has died reports nothing, with the button held or not, or its driver repeats the last report, which is no change. A stick that is held still reports no
+change either: move it slightly. After the timeout, and
 when the button is released, the node publishes zeros for half a second, then nothing. To drive again, release the button once. The node
 never arms: call iwheel/arm.
 """
@@ -32,6 +33,12 @@ class Deadman:
         self.timeout_s = timeout_s
         self.state, self.held, self.speeds = "WAITING", True, (0.0, 0.0)
         self.reported_s = self.ended_s = -math.inf
+        self.last = None
+
+    def is_new(self, report):
+        """Returns true if the report differs from the one before. A joy_node that repeats sends the last one again, also after the link has died."""
+        new, self.last = report != self.last, report
+        return new
 
     def report(self, held, linear, angular, now_s):
         """Handles a report of the gamepad: button held, speeds in m/s and rad/s."""
@@ -89,6 +96,8 @@ class JoystickNode(Node):
             index = self.values[name]
             return float(joy.axes[index]) if 0 <= index < len(joy.axes) else math.nan
 
+        if not self.deadman.is_new((list(joy.axes), list(joy.buttons))):
+            return
         button = self.values["deadman_button"]
         held = 0 <= button < len(joy.buttons) and joy.buttons[button] == 1
         linear, angular = axis("linear_axis") * self.values["linear_scale"], axis("angular_axis") * self.values["angular_scale"]
