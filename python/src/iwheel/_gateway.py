@@ -13,7 +13,7 @@ from collections.abc import Iterator
 
 from ._connection import Connection
 from ._errors import GatewayUnavailable, IWheelError, LeaseEnded, NoAnswer, ProtocolError, Refused
-from ._protocol import Configured, Confirmed, Hello, Piece, RecordingEntry, State, Status, Stop, Tared, Watched
+from ._protocol import Configured, Confirmed, Hello, OnRequest, Piece, RecordingEntry, State, Status, Stop, Tared, Watched
 from ._stop import stop_by_either
 from ._types import Applied, Event, OnStatus, Terms, Whole
 from ._wire import (
@@ -98,6 +98,10 @@ class Gateway:
         while not add_piece(data, cast(Piece, self._ask("recording", name=name, offset=len(data)))):
             pass
         return bytes(data)
+
+    def record(self, on: bool) -> OnRequest:
+        """Begins or ends the recording on request on the gateway's disk. It moves nothing."""
+        return cast(OnRequest, without_envelope(self._ask("record", on=bool(on))))
 
     def watch(self, *topics: str, rate_hz: Whole | None = None) -> Watched:
         """Subscribes to topics of `state bus estop lease stop force frame`, instead of those before. Then read `events`.

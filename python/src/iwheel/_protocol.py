@@ -446,7 +446,7 @@ class RecordingEntry(TypedDict):
     name: str
     """name of its files, without .log, .jsonl or .conf"""
     cause: str
-    """a cause, gateway_died or rolling"""
+    """a cause, gateway_died, rolling or requested"""
     wall_us: int | None
     """time at which its .conf was written, at the stop"""
     log_bytes: int | None
@@ -455,11 +455,33 @@ class RecordingEntry(TypedDict):
     conf_bytes: int | None
 
 
+RecordingEnd = Literal["request", "time", "size", "fault"]
+
+
+class OnRequest(TypedDict):
+    """The recording on request: the reply to `record`, and a part of the reply to `recordings`."""
+
+    on: bool
+    """it is being written, or begins"""
+    name: str | None
+    """name of the last one's files without suffix; None: there is none yet"""
+    ended: RecordingEnd | None
+    """reason for its end; None: not known, or it has not ended"""
+    fault: str | None
+    """the fault of the disk or of the process that writes, with ended fault"""
+    most_ms: int
+    """it ends after this time"""
+    most_bytes: int
+    """it ends at this size of its files"""
+
+
 class Recordings(TypedDict):
     """The reply to `recordings`."""
 
     recordings: list[RecordingEntry]
     """oldest first; if there are more than 64, only the newest"""
+    on_request: OnRequest
+    """state of the recording on request"""
 
 
 class Piece(TypedDict):

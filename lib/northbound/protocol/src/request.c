@@ -50,7 +50,7 @@ IW_STATIC_ASSERT(IWN_CMDS <= 24 && FIELDS <= 32, a_bit_for_each_command_and_each
 
 bool iwn_cmd_watches(iwn_cmd_t cmd) {
     const unsigned watching = BIT(HELLO) | BIT(STATUS) | BIT(WATCH) | BIT(WHY) | BIT(STOP) | BIT(DISARM) | BIT(ESTOP) |
-                              BIT(RECORDINGS) | BIT(RECORDING);
+                              BIT(RECORDINGS) | BIT(RECORDING) | BIT(RECORD);
     return (watching & 1U << cmd) != 0U;
 }
 

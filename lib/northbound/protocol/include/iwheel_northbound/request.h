@@ -43,6 +43,7 @@ typedef enum {
     IWN_CMD_CONFIRM,
     IWN_CMD_RECORDINGS,
     IWN_CMD_RECORDING,
+    IWN_CMD_RECORD,
     IWN_CMD_CONFIG,
     IWN_CMDS,
 } iwn_cmd_t;
@@ -81,6 +82,7 @@ typedef struct {
     bool has_stop;                          ///< `stop` is present.
     bool has_current;                       ///< Both currents are present.
     bool takeover;                          ///< arm.
+    bool on;                                ///< record: begin; otherwise end.
     bool has_commit;                        ///< config: `commit` is present.
     bool commit;                            ///< config, with `has_commit`.
     uint8_t topics;                         ///< watch: bit mask of iwn_topic_t.
