@@ -629,6 +629,28 @@ def another_rate(rig):
     assert zero.time_ns - pressed_ns <= EDGE_TO_ZERO_NS and not moving(rig, zero.time_ns)
 
 
+def dma_errors(rig):
+    """A bus error disables a channel of the DMA. Receiving: it starts again within the lease, and the damage is reported. Sending: one line is cut."""
+    host, uart, dma = start_driving(rig), rig.machine.uart, rig.machine.dma
+    failed_ns = rig.machine.now_ns
+    dma.receive.fail()
+    host.keep_driving(SPEED, 600)
+    assert all(frame.setpoint()[0] == SPEED for frame in rig.setpoints(failed_ns)), "the board did not receive again"
+    assert host.events("line_error"), "the damage was not reported"
+    host.say(1, {"cmd": "status"})
+    while not dma.transmit.is_on() or dma.transmit.left < 1000:
+        rig.run(US)
+    dma.transmit.fail()
+    rig.run(2 * MS)
+    host.drive(SPEED, wait=False)
+    rig.run(10 * MS)
+    cut, *texts = (host.rest + bytes(uart.sent)).split(b"\n")
+    host.rest = b"\n".join(texts)
+    uart.sent.clear()
+    assert b'"ok":true' in cut and len(texts) >= 1, "no line was cut"
+    assert host.drive(SPEED)["ok"] and host.ask(1, {"cmd": "status"})["state"] == "armed", "the board does not send any more"
+
+
 def crowd(rig):
     """Eight clients, all of whom watch and ask without end: the driver goes on, replies come before events, losses are told."""
     host = start(rig)
@@ -675,6 +697,7 @@ SCENARIOS = (
     bus_off_driven,
     hostile_line,
     noise_on_the_wire,
+    dma_errors,
     crowd,
 )
 LONG = (both_words_and_turns, estop_random, estop_in_floods, hostile_line, crowd, reset_in_motion, nobody_feeds_another, power_cut_while_learning)
