@@ -149,6 +149,7 @@ class ClocksF4(Clocks):
     reserved, reserved_value = 0xF << 28, 2 << 28  # Of PLLCFGR, kept as after reset.
     prefetch, prefetch_max_hz, cache_on, cache_reset, acr_without = 1 << 8, 1 << 40, 1 << 10, 1 << 12, 0x1800
     must_read_acr = True  # RM0090 3.5.1
+    may_prefetch = False  # ES0182: revision A does not support it, and its identifier is wrong too.
 
     def pll_from_hse(self):
         return bool(self.pllcfgr >> 22 & 1)
@@ -174,6 +175,7 @@ class ClocksF4(Clocks):
         self.expect(self.apb1_hz() <= self.apb1_max_hz, f"APB1 runs at {self.apb1_hz()} Hz")
         self.expect(self.apb2_hz() <= self.apb2_max_hz, f"APB2 runs at {self.apb2_hz()} Hz")
         self.expect((self.acr & 0xF) >= (self.core_hz - 1) // 30_000_000, "too few wait states of the flash")
+        self.expect(self.may_prefetch or not self.acr & self.prefetch, "prefetch is on, which revision A of an F407 cannot")
 
 
 class ClocksF446(ClocksF4):
@@ -181,6 +183,7 @@ class ClocksF446(ClocksF4):
 
     core_max_hz, apb1_max_hz, apb2_max_hz = 168_000_000, 45_000_000, 90_000_000
     reserved, reserved_value = 1 << 31, 0
+    may_prefetch = True
 
 
 class Port:
