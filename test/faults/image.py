@@ -18,6 +18,7 @@ IMAGE_FILES = (
     "board_clock_f1.c",
     "cortex_m.c",
     "estop.c",
+    "fault.c",
     "lamp.c",
     "main.c",
     "marker.c",

@@ -522,6 +522,46 @@ def power_cut_while_learning(rig):
     rig.note(f"{len(cuts)} cuts, {rig.machine.flash.erasures} erasures")
 
 
+def fault_of(host):
+    """(cause, address) of the event link, or None."""
+    events = host.events("link", 0)
+    return (events[-1]["fault_cause"], events[-1]["fault_pc"]) if "fault_cause" in events[-1] else None
+
+
+def fault_is_reported(rig):
+    """A fault in motion: zeros first, and the next starts report its cause and address, also after power-off. A fault that repeats itself does not wear
+    out the flash."""
+    host, machine = start_driving(rig), rig.machine
+    assert fault_of(host) is None
+
+    def fault(address):
+        while machine.active:
+            rig.run(US)
+        machine.cpu.reg_write(machine.PC, address)
+        machine.sleeping = False
+        rig.run(US)
+
+    fault(0x60000000)
+    failed_ns = machine.now_ns
+    host.begin_again()
+    zeros = rig.setpoints(failed_ns)
+    assert zeros[0].time_ns - failed_ns < 50 * MS and not moving(rig, failed_ns), "no zeros first"
+    assert fault_of(host) == (3 << 26 | 1 << 8, 0x60000000), fault_of(host)
+    operations = machine.flash.operations
+    rig.run(2 * SECOND)
+    fault(0x60000010)
+    host.begin_again()
+    assert fault_of(host) == (3 << 26 | 1 << 8, 0x60000010), "the newest fault is not reported"
+    assert machine.flash.operations == operations, "each fault is written to the flash"
+    machine.lose_power()
+    host.begin_again()
+    assert fault_of(host) == (3 << 26 | 1 << 8, 0x60000000), "the first fault did not survive power-off"
+    machine.lose_power()
+    host.begin_again()
+    assert fault_of(host) is None, "an old fault is reported for ever"
+    rig.expect_resets("software", "software", "power", "power")
+
+
 def bus_off_driven(rig):
     """Bus-off under a host: latched, told, and nothing moves when the bus is back."""
     host = start_driving(rig)
@@ -694,6 +734,7 @@ SCENARIOS = (
     power_cut_while_writing,
     learnt_in_flash,
     power_cut_while_learning,
+    fault_is_reported,
     bus_off_driven,
     hostile_line,
     noise_on_the_wire,
