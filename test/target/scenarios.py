@@ -665,6 +665,18 @@ def reset_after_unproven_hold(rig):
     assert_zero(rig.setpoints(reset_ns))
 
 
+def brown_out(rig):
+    """In motion the board's supply fails for a moment, and that of the wheels does not: zeros first."""
+    start_demo(rig)
+    rig.machine.lose_power(ram_survives=True)
+    failed_ns = rig.machine.now_ns
+    rig.run(3 * SECOND)
+    rig.expect_resets("power")
+    zeros = rig.setpoints(failed_ns + MS)
+    assert zeros and zeros[0].time_ns - failed_ns < 300 * MS, "no zeros first"
+    assert_zero(zeros)
+
+
 def stack_overflow(rig):
     """In motion the stack reaches its end: a fault, not a changed variable; it begins anew with zeros."""
     start_demo(rig)
@@ -852,6 +864,7 @@ SCENARIOS = {
         reset_again,
         reset_after_the_hold,
         reset_after_unproven_hold,
+        brown_out,
         stack_overflow,
     ),
     "gateway": gateway_scenarios.SCENARIOS,

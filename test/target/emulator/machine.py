@@ -240,7 +240,8 @@ class Machine:
         if self.watchdog.deadline_ns is not None and self.now_ns >= self.watchdog.deadline_ns:
             self.reset("watchdog", IWDGRSTF)
         if self.power_lost:
-            self.cpu.mem_write(0x20000000, bytes([self.POISON]) * self.board.ram_size)
+            if not self.ram_survives:
+                self.cpu.mem_write(0x20000000, bytes([self.POISON]) * self.board.ram_size)
             self.flash.cut_after, self.flash.next_cut, self.power_lost = self.flash.next_cut, None, False
             self.reset("power", PORRSTF)
         if self.reset_requested:
@@ -392,9 +393,9 @@ class Machine:
         if status != UC_ERR_OK:
             raise UcError(status)
 
-    def lose_power(self):
-        """From the next instruction on; then it comes back."""
-        self.power_lost = True
+    def lose_power(self, ram_survives=False):
+        """From the next instruction on; then it comes back. In a short brown-out RAM often survives."""
+        self.power_lost, self.ram_survives = True, ram_survives
         self.clock.is_asked_to_stop = 1
         self.touch()
 
