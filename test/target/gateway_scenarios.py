@@ -451,6 +451,20 @@ def power_cut_while_writing(rig):
     rig.note(f"{len(cuts)} cuts, {rig.machine.flash.erasures} erasures")
 
 
+def hardware_watchdog(rig):
+    """An option byte starts the watchdog at each reset: a start that erases a page completes it."""
+    machine, flash = rig.machine, rig.machine.flash
+    slots = 16 * 1024 if flash.unit == 4 else 1024
+    flash.memory[: slots - 256] = bytes(slots - 256)  # One slot of the first page is blank.
+    machine.watchdog.by_hardware, machine.watchdog.lsi_hz = True, machine.board.lsi_limits_hz[1]
+    machine.watchdog.reset()
+    rig.run(3 * SECOND)
+    host = start(rig)
+    assert flash.erasures == 1, f"{flash.erasures} erasures"
+    assert machine.watchdog.timeout_ns() < 200 * MS, "the period stayed extended"
+    host.arm()
+
+
 def learnt_in_flash(rig):
     """What is learnt of the wheels is written only after two seconds of silence, comes back after power-off with where it came from, and is
     forgotten with the setting it was found for."""
@@ -734,6 +748,7 @@ SCENARIOS = (
     power_cut_while_writing,
     learnt_in_flash,
     power_cut_while_learning,
+    hardware_watchdog,
     fault_is_reported,
     bus_off_driven,
     hostile_line,

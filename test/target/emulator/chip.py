@@ -633,7 +633,8 @@ class Flash:
         at = address - self.base
         self.chip.expect(0 <= at < self.size, f"0x{address:08X} of the flash was erased, which is not for what is kept")
         self.operations, self.erasures = self.operations + 1, self.erasures + 1
-        cut = self.is_cut()
+        deadline_ns = self.chip.watchdog.deadline_ns
+        cut = self.is_cut() or (deadline_ns is not None and deadline_ns < self.chip.now_ns + self.erase_ns)
         self.memory[at : at + size] = bytes(old | 0xA5 for old in self.memory[at : at + size]) if cut else b"\xff" * size
         self.spend_ns(self.erase_ns)
 
@@ -671,6 +672,10 @@ class FlashF4(Flash):
 
     base, size, lock, unit, program_ns, erase_ns = 0x08010000, 0x30000, 1 << 31, 4, 100 * US, 2000 * MS
 
+    def read(self, offset):
+        """OPTCR: as delivered; WDG_SW is 0 if the hardware starts the watchdog."""
+        return 0x0FFFAAED & ~(0x20 * self.chip.watchdog.by_hardware) if offset == 0x14 else super().read(offset)
+
     def look(self):
         sector = self.cr >> 3 & 0xF
         if self.cr & 0x10002 == 0x10002:
@@ -679,28 +684,35 @@ class FlashF4(Flash):
 
 
 class Watchdog:
-    """IWDG. Prescaler and reload take 5 cycles of its oscillator; SR tells."""
+    """IWDG. Prescaler and reload take 5 cycles of its oscillator; SR shows it, and a write meanwhile is lost. `by_hardware`: an option byte starts it at
+    each reset."""
 
-    def __init__(self, lsi_hz):
-        self.lsi_hz = lsi_hz
+    by_hardware = False
+
+    def __init__(self, chip, lsi_hz):
+        self.chip, self.lsi_hz = chip, lsi_hz
         self.reset()
 
     def reset(self):
-        self.prescaler, self.reload, self.unlocked, self.deadline_ns, self.busy_until_ns = 0, 0xFFF, False, None, 0
+        self.prescaler, self.reload, self.unlocked, self.deadline_ns, self.busy_until_ns = 0, 0xFFF, False, None, {4: 0, 8: 0}
+        if self.by_hardware:
+            self.deadline_ns = self.chip.now_ns + self.timeout_ns()
 
     def timeout_ns(self):
         return (self.reload + 1) * (4 << self.prescaler) * 10**9 // self.lsi_hz
 
     def read(self, offset, now_ns):
-        return {4: self.prescaler, 8: self.reload, 0xC: 3 if now_ns < self.busy_until_ns else 0}.get(offset, 0)
+        status = (now_ns < self.busy_until_ns[4]) | (now_ns < self.busy_until_ns[8]) << 1
+        return {4: self.prescaler, 8: self.reload, 0xC: status}.get(offset, 0)
 
     def write(self, offset, value, now_ns):
         if offset == 0:
             self.unlocked = value == 0x5555
             if value == 0xCCCC or (value == 0xAAAA and self.deadline_ns is not None):
                 self.deadline_ns = now_ns + self.timeout_ns()
-        elif self.unlocked:
-            self.busy_until_ns = now_ns + 5 * 10**9 // self.lsi_hz
+        elif self.unlocked and offset in self.busy_until_ns:
+            self.chip.expect(now_ns >= self.busy_until_ns[offset], "a register of the watchdog was written during its update")
+            self.busy_until_ns[offset] = now_ns + 5 * 10**9 // self.lsi_hz
             if offset == 4:
                 self.prescaler = value & 7
             elif offset == 8:
