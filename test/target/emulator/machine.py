@@ -63,7 +63,7 @@ class BlockClock(ctypes.Structure):
 class Machine:
     library = None  # Holds block_hook; set by the runner.
     SP, PC = SP, PC
-    POISON = 0xA5  # What RAM is full of after power-on: anything but zero.
+    POISON = 0xA5  # Contents of RAM after power-on: anything but zero.
 
     def __init__(self, board, image, seed=1):
         self.board, self.image, self.now_ns = board, image, 0
@@ -78,12 +78,12 @@ class Machine:
     def build_cpu(self):
         cpu = self.cpu = Uc(UC_ARCH_ARM, UC_MODE_THUMB | UC_MODE_MCLASS)
         cpu.ctl_set_cpu_model(self.board.cpu_model)
-        kept = range(self.board.flash.base & ~0xFFF, self.board.flash.base + self.board.flash.size)  # map_flash has these.
-        assert 0x08000000 + len(self.image) <= self.board.flash.base, "the image reaches into what is kept"
-        cpu.mem_map(0x08000000, kept.start - 0x08000000)
-        cpu.mem_map(kept.stop, 0x08100000 - kept.stop)
+        records = range(self.board.flash.base & ~0xFFF, self.board.flash.base + self.board.flash.size)  # map_flash has these.
+        assert 0x08000000 + len(self.image) <= self.board.flash.base, "the image reaches into the stored records"
+        cpu.mem_map(0x08000000, records.start - 0x08000000)
+        cpu.mem_map(records.stop, 0x08100000 - records.stop)
         cpu.mem_map(0x20000000, self.board.ram_size)
-        cpu.mem_write(0x08000000, self.image[: kept.start - 0x08000000])  # Its end, texts and no code, may share a page with what is kept: map_flash.
+        cpu.mem_write(0x08000000, self.image[: records.start - 0x08000000])  # Its end, texts and no code, may share a page with the records: map_flash.
         cpu.mem_write(ENDLESS, bytes((0xFE, 0xE7)))
         cpu.mem_write(0x20000000, bytes([self.POISON]) * self.board.ram_size)
         cpu.mem_map(self.board.unique_id_address & ~0xFFF, 0x1000, UC_PROT_READ)  # The manufacturer wrote it: the chip's own number.
@@ -147,7 +147,7 @@ class Machine:
             self.sleeping = True
 
     def hard_fault(self, cause):
-        """An access where no memory is, which only HardFault's handler handles. Without a stack the registers cannot be saved, and the handler begins
+        """An access where no memory is. Only the HardFault handler handles it. Without a stack the registers cannot be saved, and the handler begins
         nevertheless."""
         self.faults += 1
         self.cfsr |= cause
@@ -260,8 +260,8 @@ class Machine:
     def look_at_pins(self):
         for name in self.board.ports:
             getattr(self, name).changed = False
-        self.exti.look(self.board.estop_level())
-        self.lamp.look(self)
+        self.exti.poll(self.board.estop_level())
+        self.lamp.watch(self)
 
     # ---- exceptions and reset -------------------------------------------------------------------------------------
 
@@ -324,7 +324,7 @@ class Machine:
         self.cpu.reg_write(PRIMASK, 1)
 
     def reset(self, cause, flag):
-        """RAM keeps its contents; everything else begins anew."""
+        """RAM retains its contents; everything else restarts."""
         self.resets.append((self.now_ns, cause))
         self.clocks.flags |= flag
         self.frozen = False
@@ -403,7 +403,7 @@ class Machine:
         return (self.syst[0x14] + 1) * 10**9 // self.clocks.core_hz
 
     def count_tick(self):
-        """The tick that is due; code has not been told yet."""
+        """The tick that is due, before its interrupt."""
         if self.tick_ns is not None and self.now_ns >= self.tick_ns:
             self.clock.is_asked_to_stop = 1
             self.pending.add(SYSTICK)
