@@ -7,7 +7,8 @@
 /// | STM32F4xx  | sectors 4 (64 KiB) and 5 | 2 s            | 100 us            | the CPU stalls |
 ///
 /// The figures are from the data sheets (memory characteristics: 5.3.9 of an F103, 5.3.12 of an F4). An erase on an F4
-/// takes longer than the period of the watchdog, so it is allowed only before the watchdog is started.
+/// takes longer than the period of the watchdog, so it is allowed only before the watchdog is started. If an option
+/// byte starts the watchdog at the reset, the erase extends its period first.
 #ifndef BRD_FLASH_H
 #define BRD_FLASH_H
 
