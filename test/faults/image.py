@@ -10,7 +10,7 @@ from pathlib import Path
 from table import ROOT, Broken
 
 TARGET, PORT, APPLICATION, SERVER = (ROOT / name for name in ("test/target", "port/stm32_stub", "app/board", "lib/northbound/server/src"))
-DRIVER_FILES = ("bxcan.c", "bxcan_filters.c", "frame_ring.c")
+DRIVER_FILES = ("bxcan.c", "bxcan_filters.c", "can_bxcan.c", "can_groups.c", "frame_ring.c")
 IMAGE_FILES = (
     *DRIVER_FILES,
     "board_clock.c",

@@ -79,7 +79,7 @@ def test_crystal_without_exact_bus_rate_does_not_compile(board, mhz):
 @pytest.mark.parametrize(("board", "mhz"), [("stm32f103", 36), ("stm32f407", 42), ("stm32f446", 45)])
 def test_image_does_not_compile_with_the_usual_bus_clock(board, mhz):
     options = {"SETPOINT_TYPE_VALUE": "0", "SETPOINT_TYPE_IS_SET": "false", "CURRENT_ROLE_VALUE": "IW_ROLE_UNSET", "TRACK_MM_VALUE": "0"}
-    done = check_source(board, "main.c", f"-DBRD_APB1_HZ={mhz}000000U", *(f"-DIWHEEL_{name}={value}" for name, value in options.items()))
+    done = check_source(board, "can_bxcan.c", f"-DBRD_APB1_HZ={mhz}000000U", *(f"-DIWHEEL_{name}={value}" for name, value in options.items()))
     assert done.returncode != 0 and f"{mhz}" in done.stderr and "multiple of 8 MHz" in done.stderr
 
 
