@@ -12,7 +12,7 @@ import pytest
 from images import ROOT, STM32
 
 PAGE = ROOT / "docs/user/stm32.md"
-PRESETS = {"stm32f103": "arm-m3", "stm32f407": "arm", "stm32f446": "arm"}
+PRESETS = {"stm32f103": "arm-m3", "stm32f407": "arm", "stm32f446": "arm", "stm32g474": "arm"}
 PINS = {
     "e-stop": "BRD_ESTOP",
     "button": "BRD_BUTTON",
@@ -50,7 +50,7 @@ def rows():
         if what == "lamp":
             cells = [f"{cell}, lit by {'a high' if known[board]['lit'] else 'a low'} level" for cell, board in zip(cells, PRESETS, strict=True)]
         if what.startswith("CAN"):
-            cells = [f"{cell}; {pin(other[what])} with `IWHEEL_CAN_PINS=PA11`" for cell in cells]
+            cells = [cell if cell == pin(other[what]) else f"{cell}; {pin(other[what])} with `IWHEEL_CAN_PINS=PA11`" for cell in cells]
         yield f"| {what} | " + " | ".join(cells) + " |"
     yield "| core, APB1 | " + " | ".join(f"{known[board]['core']}, {known[board]['apb1']} MHz" for board in PRESETS) + " |"
 
