@@ -14,22 +14,22 @@ static void put(pretend_wheels_t *self, const iw_can_frame_t *frame) {
 void pretend_wheels_run(pretend_wheels_t *self) {
     for (unsigned side = 0; side < IW_SIDES; side++) {
         const int16_t rpm = (int16_t)(self->speed_mm_s[side] * 60 * 1000 / UM_PER_TURN);
-        const iw_codec_wheel_t told = {.speed = {.speed_rpm = rpm}};
+        const iw_codec_wheel_t values = {.speed = {.speed_rpm = rpm}};
         iw_can_frame_t frame;
-        if (iw_codec_encode(IW_CODEC_SPEED, (iw_side_t)side, &told, &frame) == IW_OK) {
+        if (iw_codec_encode(IW_CODEC_SPEED, (iw_side_t)side, &values, &frame) == IW_OK) {
             put(self, &frame);
         }
     }
 }
 
-static void hear(pretend_wheels_t *self, const iw_can_frame_t *frame) {
+static void receive(pretend_wheels_t *self, const iw_can_frame_t *frame) {
     iw_can_frame_t echo = *frame;
-    iw_codec_wheel_t told[IW_SIDES];
-    if (iw_codec_decode(frame, told) == IW_CODEC_SETPOINT) {
+    iw_codec_wheel_t values[IW_SIDES];
+    if (iw_codec_decode(frame, values) == IW_CODEC_SETPOINT) {
         const iw_side_t side = iw_codec_side(frame->id);
-        self->speed_mm_s[side] = told[side].setpoint.speed_mm_s;
-        if (told[side].setpoint.speed_mm_s > self->fastest_mm_s) {
-            self->fastest_mm_s = told[side].setpoint.speed_mm_s;
+        self->speed_mm_s[side] = values[side].setpoint.speed_mm_s;
+        if (values[side].setpoint.speed_mm_s > self->fastest_mm_s) {
+            self->fastest_mm_s = values[side].setpoint.speed_mm_s;
         }
     }
     echo.kind = IW_CAN_ECHO;
@@ -39,7 +39,7 @@ static void hear(pretend_wheels_t *self, const iw_can_frame_t *frame) {
 static int send(void *context, const iw_can_frame_t *frames, uint32_t count) {
     pretend_wheels_t *self = (pretend_wheels_t *)context;
     for (uint32_t i = 0; i < count; i++) {
-        hear(self, &frames[i]);
+        receive(self, &frames[i]);
     }
     return (int)count;
 }

@@ -29,7 +29,7 @@ TEXT_GOAL = 6 * 1024  # Goal of the design. The core does not reach it yet, so i
 TYPES = ("iw_gateway_t", "iw_config_t", "iw_wheel_t", "iw_force_t", "iw_permit_t", "iw_setpoint_t", "iw_confirmation_t", "iw_envelope_t")
 ROW = re.compile(r"^\| `?([^|`]+?)`? +\|(.*)\|$", re.MULTILINE)
 CODEC = "iw_codec_decode iw_codec_encode_setpoint"
-SETPOINT = "iw_setpoint_init iw_setpoint_demand iw_setpoint_command iw_setpoint_due iw_setpoint_take iw_setpoint_next_us"
+SETPOINT = "iw_setpoint_init iw_setpoint_demand iw_setpoint_command iw_setpoint_due iw_setpoint_next iw_setpoint_next_us"
 FORCE = "iw_force_init iw_force_reopen iw_force_receive iw_force_receive_offset iw_force_validity iw_force_net_mN"
 GATEWAY = (
     "iw_config_default iw_gateway_init iw_gateway_step iw_gateway_suspended iw_gateway_bus_facts iw_gateway_arm iw_gateway_drive "

@@ -224,7 +224,7 @@ void iwn_target_describe(iwn_server_t *server, iw_refusal_t refusal, iwn_refuse_
     context->stale_client = name(self, context->seen->stale_client, 1);
     context->stopped_by = (server->stopped_us > 0U) ? name(self, server->stopped_by, 2) : NULL;
     context->estopped_by = (server->estopped_us > 0U) ? name(self, server->estopped_by, 3) : NULL;
-    context->bus_cure = "check cable, termination, transceiver and that the wheels have power";
+    context->bus_fix = "check cable, termination, transceiver and that the wheels have power";
     context->timing = "the bit timing of the bus is wrong; report this";
     context->contradiction = "an assumption that motion depends on is contradicted; see: iwheelctl ledger";
     context->configure = "by the request config (of section wheels) and commit";

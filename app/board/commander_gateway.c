@@ -47,7 +47,7 @@ void brd_commander_configure(iw_config_t *config) {
     is_complete = config->setpoint_type_set && config->current_role != IW_ROLE_UNSET;
 }
 
-bool brd_host_keep(const brd_settings_t *settings) {
+bool brd_host_store(const brd_settings_t *settings) {
     return brd_records_commit(&records, settings);
 }
 
@@ -83,7 +83,7 @@ void brd_commander_step(brd_commander_t *self, iw_gateway_t *gateway, iw_time_us
     if (!is_begun) {
         begin(gateway, now_us);
     }
-    if (brd_host_take(&host, now_us)) {
+    if (brd_host_receive(&host, now_us)) {
         brd_wake(); // More lines wait. The loop reads the e-stop before the next one.
     }
 }
@@ -93,7 +93,7 @@ iw_snapshot_t *brd_report_room(void) {
 }
 
 void brd_report_step(const iw_snapshot_t *seen, bool estop_pressed) {
-    (void)brd_host_tell(&host, seen, estop_pressed);
+    (void)brd_host_report(&host, seen, estop_pressed);
     if (brd_host_wants_restart(&host)) {
         brd_system_reset();
     }

@@ -41,7 +41,7 @@ static bool configure(brd_host_t *self, iwn_text_t *why, iwn_error_t *out_error)
         return false;
     }
     *out_error = IWN_INTERNAL;
-    if (!brd_host_keep(&self->staged)) {
+    if (!brd_host_store(&self->staged)) {
         iwn_text_add(why, "the flash did not accept it, and the old configuration stays; switch the board off and on, "
                           "and try again");
         return false;

@@ -35,14 +35,14 @@ static bool is_same(iw_assumption_item_t item, const brd_settings_t *found, cons
 static bool compare(brd_host_t *self, bool *out_same) {
     const iwn_request_t *const request = &self->server.request;
     const char *const key = brd_assumptions_key(request->item);
-    const bool is_told = request->value[0] != '\0';
+    const bool has_value = request->value[0] != '\0';
     char value[BRD_SETTINGS_TEXT];
     brd_settings_t found = self->settings;
     iwn_text_t why = iwn_text_begin(self->server.refusal.message, sizeof self->server.refusal.message);
     *out_same = true;
     self->server.refusal.error = IWN_BAD_VALUE;
     if (key == NULL) {
-        *out_same = !is_told || strcmp(request->value, "yes") == 0;
+        *out_same = !has_value || strcmp(request->value, "yes") == 0;
         return *out_same || strcmp(request->value, "no") == 0 ||
                IWN_REFUSE(&self->server.refusal, IWN_BAD_VALUE, "value must be yes or no; leave it out to confirm it");
     }
@@ -51,7 +51,7 @@ static bool compare(brd_host_t *self, bool *out_same) {
                           (request->item == IW_ASSUMPTION_TRACK) ? IWN_TRACK_NOT_SET : IWN_TYPE_NOT_SET,
                           "it is not configured, so there is nothing to confirm; set it by the request config first");
     }
-    if (is_told && !brd_settings_set(&found, key, request->value, &why)) {
+    if (has_value && !brd_settings_set(&found, key, request->value, &why)) {
         return false;
     }
     *out_same = is_same(request->item, &found, &self->settings);

@@ -65,7 +65,7 @@ static bool obey_link(brd_host_t *self, iwn_json_t root) {
     }
     if (iwn_json_is(cmd, "link")) {
         end_all(self); // Another relay, or the same one after a restart, has other clients.
-        brd_host_tell_link(self);
+        brd_host_report_link(self);
         return true;
     }
     if (!find_channel(root, &channel)) {
@@ -191,14 +191,14 @@ void brd_host_init(brd_host_t *self, const brd_host_place_t *place, iw_time_us_t
     iwn_receiver_init(&self->receiver, self->in, sizeof self->in, false);
     iwn_server_begin(server);
     recall(self);
-    brd_host_tell_link(self);
+    brd_host_report_link(self);
 }
 
 bool brd_host_wants_restart(const brd_host_t *self) {
     return self->restart_us != 0U && (brd_serial_is_idle() || self->server.now_us >= self->restart_us);
 }
 
-bool brd_host_take(brd_host_t *self, iw_time_us_t now_us) {
+bool brd_host_receive(brd_host_t *self, iw_time_us_t now_us) {
     char byte;
     self->server.now_us = now_us;
     if (now_us - self->received_us >= (iw_time_us_t)IWN_LINE_SILENT_MS * IW_US_PER_MS) {
@@ -241,7 +241,7 @@ static void pay(brd_host_t *self, const iw_snapshot_t *seen) {
     }
 }
 
-iw_time_us_t brd_host_tell(brd_host_t *self, const iw_snapshot_t *seen, bool estop_high) {
+iw_time_us_t brd_host_report(brd_host_t *self, const iw_snapshot_t *seen, bool estop_high) {
     iwn_server_t *const server = &self->server;
     server->now_us = seen->at_us;
     server->estop.answer = estop_high ? 1 : 0;
@@ -249,17 +249,17 @@ iw_time_us_t brd_host_tell(brd_host_t *self, const iw_snapshot_t *seen, bool est
     iwn_server_arming(server, seen);
     for (unsigned i = 0; i < IWN_LINE_CHANNELS; i++) {
         if (self->client[i].lost > 0U) {
-            brd_host_tell_lost(self, &self->client[i]);
+            brd_host_report_lost(self, &self->client[i]);
         }
     }
     iwn_server_periodic(server);
     pay(self, seen);
-    brd_host_tell_fault(self);
+    brd_host_report_fault(self);
     learn(self, seen);
     const bool armed = seen->state == IW_STATE_ARMED;
     if (server->now_us - self->linked_us >= BRD_HOST_LINK_US ||
         (armed && server->now_us - self->stamped_us >= BRD_HOST_LINK_ARMED_US)) {
-        brd_host_tell_link(self);
+        brd_host_report_link(self);
     }
     const iw_time_us_t next_us = iwn_server_next_us(server);
     const iw_time_us_t link_us = self->linked_us + BRD_HOST_LINK_US;

@@ -100,7 +100,7 @@ typedef struct {
     bool has_staged;          ///< `staged` contains changes.
     brd_records_state_t records;
     brd_assumptions_zero_t zero[IW_SIDES]; ///< Sources of the offsets in force.
-    brd_host_reported_t told;
+    brd_host_reported_t reported;
     iwn_server_t server;
     brd_settings_t settings; ///< Settings in force.
     brd_settings_t staged;   ///< Changed by `config`; in force after a commit and the restart that follows it.
@@ -122,20 +122,20 @@ void brd_host_init(brd_host_t *self, const brd_host_place_t *place, iw_time_us_t
 /// Call it directly before a step of the gateway. It closes all channels if the relay has sent nothing for
 /// IWN_LINE_SILENT_MS, and executes one line: a request can need milliseconds, and the loop must read the e-stop
 /// between two of them. Returns true if more lines may wait: call it again immediately, after the step.
-bool brd_host_take(brd_host_t *self, iw_time_us_t now_us);
+bool brd_host_receive(brd_host_t *self, iw_time_us_t now_us);
 
 /// Call it directly after the step. It answers the arms that the step decided, reports changes, and sends due events.
 /// Returns the latest time of the next call.
-iw_time_us_t brd_host_tell(brd_host_t *self, const iw_snapshot_t *seen, bool estop_high);
+iw_time_us_t brd_host_report(brd_host_t *self, const iw_snapshot_t *seen, bool estop_high);
 
 // For the files of this part.
 
 /// Reports to the client the number of its dropped lines, if that line fits the ring.
-void brd_host_tell_lost(brd_host_t *self, brd_host_client_t *client);
+void brd_host_report_lost(brd_host_t *self, brd_host_client_t *client);
 /// Sends the event `link`, which identifies the board, on the channel of the link.
-void brd_host_tell_link(brd_host_t *self);
+void brd_host_report_link(brd_host_t *self);
 /// Reports new bad lines, unless the last report is too recent.
-void brd_host_tell_fault(brd_host_t *self);
+void brd_host_report_fault(brd_host_t *self);
 
 /// Lends a snapshot to the serial line if it is free: as reply with `id`, or as event `state` if `id` is NULL.
 void brd_host_send_status(brd_host_t *self, brd_host_client_t *client, const iw_snapshot_t *seen, const iwn_id_t *id);
@@ -147,7 +147,7 @@ static inline brd_host_t *brd_host_of(iwn_server_t *server) {
 
 /// The image implements it. Stores a configuration for the next start. Returns false if that failed; the old one then
 /// stays.
-bool brd_host_keep(const brd_settings_t *settings);
+bool brd_host_store(const brd_settings_t *settings);
 /// The image implements it. Reads the facts that earlier runs learned. Returns false if there are none.
 bool brd_host_read_assumptions(brd_assumptions_t *out_learned);
 /// The image implements it. Stores learned facts. Returns false if that failed.

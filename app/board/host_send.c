@@ -79,7 +79,7 @@ void iwn_target_event(iwn_server_t *server, iwn_client_t *client, char *line, si
 }
 
 /// Reports the number of dropped lines before any other event.
-void brd_host_tell_lost(brd_host_t *self, brd_host_client_t *client) {
+void brd_host_report_lost(brd_host_t *self, brd_host_client_t *client) {
     iwn_out_t json = iwn_server_begin_event(&self->server, "lost");
     iwn_out_int(&json, "count", client->lost);
     const size_t length = finish(&json);
@@ -120,7 +120,7 @@ void iwn_target_write_assumptions(iwn_server_t *server, const iw_snapshot_t *see
 void brd_host_send_status(brd_host_t *self, brd_host_client_t *client, const iw_snapshot_t *seen, const iwn_id_t *id) {
     char *const data = &self->big[IWN_LINE_PREFIX];
     const size_t size = sizeof self->big - IWN_LINE_PREFIX - IWN_LINE_SUFFIX;
-    iwn_out_t json = (id != NULL) ? iwn_tell_reply(data, size, id, true) : iwn_tell_event(data, size, "state");
+    iwn_out_t json = (id != NULL) ? iwn_write_reply(data, size, id, true) : iwn_write_event(data, size, "state");
     iwn_server_write_status(&self->server, seen, &json);
     size_t whole = 0;
     const size_t length = finish(&json);
@@ -132,7 +132,7 @@ void brd_host_send_status(brd_host_t *self, brd_host_client_t *client, const iw_
     }
 }
 
-void brd_host_tell_link(brd_host_t *self) {
+void brd_host_report_link(brd_host_t *self) {
     char boot[IWN_LINE_BOOT + 1U];
     iwn_out_t json = iwn_server_begin_event(&self->server, "link");
     iwn_out_text(&json, "boot", boot_text(self->boot, boot));
@@ -144,7 +144,7 @@ void brd_host_tell_link(brd_host_t *self) {
     }
 }
 
-void brd_host_tell_fault(brd_host_t *self) {
+void brd_host_report_fault(brd_host_t *self) {
     if (self->errors == self->errors_told || self->server.now_us - self->error_us < BRD_HOST_ERROR_US) {
         return;
     }

@@ -172,7 +172,7 @@ static gw_pace_t pace_of(const gw_daemon_t *daemon, const iw_snapshot_t *seen) {
     return (seen->state == IW_STATE_ARMED && !seen->arming) ? GW_PACE_DRIVING : GW_PACE_ALERT;
 }
 
-static void plan_look(gw_daemon_t *daemon, const iw_snapshot_t *seen) {
+static void plan_poll(gw_daemon_t *daemon, const iw_snapshot_t *seen) {
     gw_loop_t *loop = &daemon->loop;
     loop->pace = pace_of(daemon, seen);
     const bool echo_waits = loop->pace == GW_PACE_DRIVING && seen->waiting_us != IW_NEVER;
@@ -198,13 +198,13 @@ static void read_clock(gw_daemon_t *daemon) {
 static void step(gw_daemon_t *daemon) {
     gw_wheels_t *wheels = &daemon->wheels;
     iwl_hal_poll(&wheels->hal, wheels->now_us);
-    gw_bus_facts_follow(&daemon->facts, wheels, daemon->answers.server.told.left_behind);
+    gw_bus_facts_follow(&daemon->facts, wheels, daemon->answers.server.reported.left_behind);
     const iw_snapshot_t seen = gw_wheels_step(wheels);
     mark_if_sending(daemon, &seen);
     iw_observation_step(&wheels->observation, &wheels->core, &seen);
     gw_answers_observe(&daemon->answers, &seen);
     gw_answers_arming(&daemon->answers, &seen);
-    plan_look(daemon, &seen);
+    plan_poll(daemon, &seen);
     daemon->loop.holder = seen.holder;
 }
 
@@ -212,7 +212,7 @@ static iw_time_us_t earlier(iw_time_us_t a_us, iw_time_us_t b_us) {
     return (a_us < b_us) ? a_us : b_us;
 }
 
-static bool looks(const gw_daemon_t *daemon) {
+static bool polls(const gw_daemon_t *daemon) {
     return daemon->loop.frames_wait ||
            (daemon->wheels.hal.estop_ops->present && gw_wheels_are_sent_to(&daemon->wheels));
 }
@@ -226,7 +226,7 @@ static iw_time_us_t next_us(gw_daemon_t *daemon) {
     next_us = earlier(next_us, gw_answers_next_us(&daemon->answers));
     next_us = earlier(next_us, gw_answers_frames_us(&daemon->answers));
     next_us = earlier(next_us, sock_service_next_us(&daemon->clients));
-    return looks(daemon) ? earlier(next_us, daemon->loop.look_us) : next_us;
+    return polls(daemon) ? earlier(next_us, daemon->loop.look_us) : next_us;
 }
 
 /// Sets whether the bus wakes the loop. Frames that arrive regularly may wait, unless a client watches them.
@@ -290,7 +290,7 @@ static void listen_to_writer(gw_daemon_t *daemon) {
 /// Returns the lease holder if it has sent something while nothing else is due. Its command is executed before the
 /// reading of bus and e-stop, which then judges it too, so that it is sent after one reading instead of two. Returns
 /// NULL if the reading comes first.
-static sock_client_t *heard_first(gw_daemon_t *daemon) {
+static sock_client_t *holder_first(gw_daemon_t *daemon) {
     const gw_wheels_t *wheels = &daemon->wheels;
     const bool due = wheels->now_us >= wheels->step_us || wheels->requested;
     sock_client_t *holder = (daemon->loop.pace == GW_PACE_DRIVING && !due)
@@ -300,10 +300,10 @@ static sock_client_t *heard_first(gw_daemon_t *daemon) {
 }
 
 /// Runs the step of the core, which reads everything before it sends.
-static void hear_and_step(gw_daemon_t *daemon, iwl_reported_t told) {
-    sock_client_t *first = told.estop ? NULL : heard_first(daemon);
-    told.estop = told.estop || first != NULL; // Edges since the wait count too.
-    iwl_hal_waited(&daemon->wheels.hal, told);
+static void execute_first_and_step(gw_daemon_t *daemon, iwl_reported_t woken) {
+    sock_client_t *first = woken.estop ? NULL : holder_first(daemon);
+    woken.estop = woken.estop || first != NULL; // Edges since the wait count too.
+    iwl_hal_waited(&daemon->wheels.hal, woken);
     if (first != NULL) {
         sock_service_first(&daemon->clients, first);
     }
@@ -342,15 +342,15 @@ int gw_loop_run(gw_daemon_t *daemon) {
         }
         bool somebody_knocks = false;
         // An interrupted wait has no result.
-        iwl_reported_t told = {.bus = count < 0, .estop = count < 0};
+        iwl_reported_t woken = {.bus = count < 0, .estop = count < 0};
         read_clock(daemon);
         daemon->clients.now_us = daemon->wheels.now_us;
         for (int i = 0; i < count; i++) {
             somebody_knocks = note_event(daemon, &events[i]) || somebody_knocks;
-            told.bus = told.bus || events[i].data.u64 == SOCK_TAG_BUS;
-            told.estop = told.estop || events[i].data.u64 == SOCK_TAG_ESTOP;
+            woken.bus = woken.bus || events[i].data.u64 == SOCK_TAG_BUS;
+            woken.estop = woken.estop || events[i].data.u64 == SOCK_TAG_ESTOP;
         }
-        hear_and_step(daemon, told);
+        execute_first_and_step(daemon, woken);
         cycle(daemon, somebody_knocks);
         if (!ready) {
             ready = true;

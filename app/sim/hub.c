@@ -57,7 +57,7 @@ void sim_hub_deliver(sim_hub_t *self, const sim_delivery_t *delivery) {
     }
 }
 
-static void tell_others(sim_hub_t *self, const sim_client_t *from, const iw_can_frame_t *frame) {
+static void send_to_others(sim_hub_t *self, const sim_client_t *from, const iw_can_frame_t *frame) {
     for (unsigned i = 0U; i < SIM_WORLD_CLIENTS; i++) {
         if (self->client[i].watch.fd >= 0 && &self->client[i] != from) {
             pass_on(&self->client[i], frame, (from == NULL) ? MARK_NONE : MARK_FORGED);
@@ -66,15 +66,15 @@ static void tell_others(sim_hub_t *self, const sim_client_t *from, const iw_can_
 }
 
 void sim_hub_tell(sim_hub_t *self, const iw_can_frame_t *error_frame) {
-    tell_others(self, NULL, error_frame);
+    send_to_others(self, NULL, error_frame);
 }
 
-static void take(sim_client_t *client, const struct can_frame *message) {
+static void forward(sim_client_t *client, const struct can_frame *message) {
     sim_hub_t *const hub = client->hub;
     iw_can_frame_t frame = {.id = message->can_id, .dlc = message->can_dlc};
     memcpy(frame.data, message->data, sizeof frame.data);
     if ((frame.id & IW_CAN_ERROR) != 0U) {
-        tell_others(hub, client, &frame);
+        send_to_others(hub, client, &frame);
         return;
     }
     if ((frame.id & IW_CAN_EXTENDED) == 0U) {
@@ -98,7 +98,7 @@ static void client_ready(sim_watch_t *watch) {
         }
         memcpy(&message, bytes, sizeof message);
         if (length == (ssize_t)sizeof message && message.can_dlc <= CAN_MAX_DLEN) {
-            take(client, &message);
+            forward(client, &message);
         } else {
             client->hub->malformed += 1U;
         }

@@ -40,7 +40,7 @@ static int receive(int fd, bool help) {
 
 /// Sends one command to a running simulator and prints the answer. Returns the exit code: 0 ok, 1 refused, 69 no
 /// simulator, 75 no answer.
-static int tell(const char *control_path, const char *command) {
+static int send_command(const char *control_path, const char *command) {
     char line[SIM_LINE_BYTES + 1U];
     struct timeval const limit = {.tv_sec = ANSWER_WITHIN_S};
     int const length = snprintf(line, sizeof line, "%s\n", command);
@@ -69,7 +69,7 @@ int main(int argc, char **argv) {
         return result;
     }
     if (options.command[0] != '\0') {
-        return tell(options.control_path, options.command);
+        return send_command(options.control_path, options.command);
     }
     result = sim_simulator_open(&simulator, &options);
     if (result >= 0) {

@@ -83,13 +83,14 @@ static bool read_argument(const sim_argument_t *argument, const char *word, int6
 
 /// Reads the arguments. Returns false if the words are not those that the command accepts.
 static bool read_arguments(const sim_command_t *command, sim_call_t *call) {
-    const unsigned given = call->words->count - 1U;
+    const unsigned arguments = call->words->count - 1U;
     unsigned values = 0U;
     unsigned i = 0U;
     for (; i < SIM_ARGUMENTS && command->argument[i].kind != SIM_NOTHING; i++) {
         const sim_argument_t *const argument = &command->argument[i];
         int64_t value = argument->value;
-        const bool good = (i < given) ? read_argument(argument, call->words->word[i + 1U], &value) : argument->optional;
+        const bool good =
+            (i < arguments) ? read_argument(argument, call->words->word[i + 1U], &value) : argument->optional;
         if (!good) {
             return false;
         }
@@ -102,7 +103,7 @@ static bool read_arguments(const sim_command_t *command, sim_call_t *call) {
             call->value[values++] = value;
         }
     }
-    return given <= i;
+    return arguments <= i;
 }
 
 static sim_outcome_t run(sim_panel_t *self, const sim_command_t *command, sim_call_t *call) {

@@ -14,7 +14,7 @@
 
 typedef const char *result_t;
 
-static void tell(const sim_call_t *call, sim_error_t error) {
+static void report(const sim_call_t *call, sim_error_t error) {
     if (call->panel->hooks.hub != NULL) {
         iw_can_frame_t const frame = sim_hub_error_frame(error);
         sim_hub_tell(call->panel->hooks.hub, &frame);
@@ -34,12 +34,12 @@ static result_t set_stall(const sim_call_t *call) {
 static result_t set_busoff(const sim_call_t *call) {
     const bool on = call->value[0] != 0;
     sim_world_bus_off(call->world, call->now_us, on);
-    tell(call, on ? SIM_ERROR_BUS_OFF : SIM_ERROR_RESTARTED);
+    report(call, on ? SIM_ERROR_BUS_OFF : SIM_ERROR_RESTARTED);
     return NULL;
 }
 
 static result_t set_passive(const sim_call_t *call) {
-    tell(call, (call->value[0] != 0) ? SIM_ERROR_PASSIVE : SIM_ERROR_ACTIVE);
+    report(call, (call->value[0] != 0) ? SIM_ERROR_PASSIVE : SIM_ERROR_ACTIVE);
     return NULL;
 }
 
@@ -100,9 +100,9 @@ typedef struct {
     bool pulses;
     bool on;
     iw_time_us_t until_us;
-} wish_t;
+} action_t;
 
-static result_t obey(const wish_t *config, sim_button_t *button) {
+static result_t obey(const action_t *config, sim_button_t *button) {
     if (config->pulses && button->pressed) {
         return "the button is pressed already; first: estop release";
     }
@@ -115,14 +115,14 @@ static result_t obey(const wish_t *config, sim_button_t *button) {
 }
 
 /// Applies the action to all contacts of the button.
-static result_t obey_all(const wish_t *config, const sim_hooks_t *hooks) {
+static result_t obey_all(const action_t *config, const sim_hooks_t *hooks) {
     result_t result = (hooks->button != NULL) ? obey(config, hooks->button) : NULL;
     return (result == NULL && hooks->second != NULL) ? obey(config, hooks->second) : result;
 }
 
 /// Reads the action. Returns false if it does not exist. `span` is the duration of a pulse in us, or UNTOLD.
-static bool read_wish(const sim_call_t *call, const char *action, int64_t span, wish_t *out_config) {
-    *out_config = (wish_t){.pulses = strcmp(action, "pulse") == 0, .until_us = call->now_us + (iw_time_us_t)span};
+static bool read_action(const sim_call_t *call, const char *action, int64_t span, action_t *out_config) {
+    *out_config = (action_t){.pulses = strcmp(action, "pulse") == 0, .until_us = call->now_us + (iw_time_us_t)span};
     out_config->plug = sim_words_choice(action, (sim_choice_t){"unplug", "plug"}, &out_config->on);
     return out_config->pulses == (span != UNTOLD) &&
            (out_config->pulses || out_config->plug ||
@@ -130,16 +130,16 @@ static bool read_wish(const sim_call_t *call, const char *action, int64_t span, 
 }
 
 static result_t set_estop(const sim_call_t *call) {
-    wish_t config;
-    return read_wish(call, call->words->word[1], call->value[1], &config) ? obey_all(&config, &call->panel->hooks)
-                                                                          : SIM_USAGE;
+    action_t config;
+    return read_action(call, call->words->word[1], call->value[1], &config) ? obey_all(&config, &call->panel->hooks)
+                                                                            : SIM_USAGE;
 }
 
 static result_t set_contact(const sim_call_t *call) {
     const sim_hooks_t *const hooks = &call->panel->hooks;
     sim_button_t *const button = (call->value[0] == 1) ? hooks->button : hooks->second;
-    wish_t config;
-    if (!read_wish(call, call->words->word[2], call->value[2], &config)) {
+    action_t config;
+    if (!read_action(call, call->words->word[2], call->value[2], &config)) {
         return SIM_USAGE;
     }
     if (hooks->button != NULL && hooks->second == NULL) {
@@ -170,15 +170,15 @@ static result_t status(const sim_call_t *call) {
 
 static result_t heal(const sim_call_t *call) {
     sim_hub_t *const hub = call->panel->hooks.hub;
-    static const wish_t mended[] = {{.plug = true}, {.plug = false}};
+    static const action_t repaired[] = {{.plug = true}, {.plug = false}};
     bool const was_off = call->world->bus_off;
     sim_world_heal(call->world, call->now_us);
-    tell(call, was_off ? SIM_ERROR_RESTARTED : SIM_ERROR_ACTIVE);
+    report(call, was_off ? SIM_ERROR_RESTARTED : SIM_ERROR_ACTIVE);
     if (hub != NULL) {
         sim_hub_down(hub, false);
     }
-    (void)obey_all(&mended[0], &call->panel->hooks);
-    return obey_all(&mended[1], &call->panel->hooks);
+    (void)obey_all(&repaired[0], &call->panel->hooks);
+    return obey_all(&repaired[1], &call->panel->hooks);
 }
 
 static result_t quit(const sim_call_t *call) {

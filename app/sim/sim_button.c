@@ -6,17 +6,17 @@
 
 /// Sends the state to a client. Disconnects a client that does not read this byte, because it cannot be informed any
 /// more; a lost connection means pressed.
-static void tell(const sim_button_t *self, sim_watch_t *client) {
+static void send_state(const sim_button_t *self, sim_watch_t *client) {
     char const state = self->pressed ? '1' : '0';
     if (send(client->fd, &state, 1U, MSG_DONTWAIT | MSG_NOSIGNAL) != 1) {
         sim_loop_drop(self->loop, client);
     }
 }
 
-static void tell_all(sim_button_t *self) {
+static void send_to_all(sim_button_t *self) {
     for (unsigned i = 0U; i < SIM_BUTTON_CLIENTS; i++) {
         if (self->client[i].fd >= 0) {
-            tell(self, &self->client[i]);
+            send_state(self, &self->client[i]);
         }
     }
 }
@@ -40,7 +40,7 @@ static bool admit(void *owner, int fd) {
                 client->fd = -1;
                 return false;
             }
-            tell(self, client);
+            send_state(self, client);
             return true;
         }
     }
@@ -60,7 +60,7 @@ void sim_button_press(sim_button_t *self, bool pressed) {
     self->release_us = IW_NEVER;
     if (pressed != self->pressed) {
         self->pressed = pressed;
-        tell_all(self);
+        send_to_all(self);
     }
 }
 

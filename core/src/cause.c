@@ -39,12 +39,12 @@ bool iw_cause_latches(iw_cause_t cause) {
     return iw_cause_rows[cause].effect != IW_STOPS;
 }
 
-uint32_t iw_cause_present(uint32_t told, const iw_time_us_t seen_us[IW_CAUSES], iw_time_us_t now_us) {
+uint32_t iw_cause_present(uint32_t reported, const iw_time_us_t seen_us[IW_CAUSES], iw_time_us_t now_us) {
     uint32_t present = 0;
     for (uint32_t cause = FIRST; cause <= LAST; cause++) {
         const uint32_t bit = IW_CAUSE_BIT(cause);
-        const bool is =
-            iw_cause_rows[cause].level ? (told & bit) != 0U : iw_age_us(seen_us[cause], now_us) < IW_PERMIT_EVENT_US;
+        const bool is = iw_cause_rows[cause].level ? (reported & bit) != 0U
+                                                   : iw_age_us(seen_us[cause], now_us) < IW_PERMIT_EVENT_US;
         present |= is ? bit : 0U;
     }
     return present;

@@ -24,7 +24,7 @@ extern const iw_cause_row_t iw_cause_rows[IW_CAUSES];
 #define IW_CAUSE_BIT(cause) (1U << (uint32_t)(cause))
 
 /// Returns the latching causes that are present: levels that are raised, and events not older than IW_PERMIT_EVENT_US.
-uint32_t iw_cause_present(uint32_t told, const iw_time_us_t seen_us[IW_CAUSES], iw_time_us_t now_us);
+uint32_t iw_cause_present(uint32_t reported, const iw_time_us_t seen_us[IW_CAUSES], iw_time_us_t now_us);
 
 /// Returns the refusal of the cause that explains the others in a set of latching causes, or IW_REFUSE_NONE if the set
 /// is empty.

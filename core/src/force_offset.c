@@ -152,7 +152,7 @@ static iw_unit_observation_t weigh(int32_t mean_raw, int32_t offset_dN) {
 
 /// Compares the mean of a good window with the wheel's offset. A small offset cannot decide the unit (0 in cN is 0 in
 /// dN), but a mean far from it still shows a load in one of the two measurements.
-static void judge_evidence(iw_force_t *self) {
+static void judge_unit(iw_force_t *self) {
     const int32_t offset_dN = self->wheel_offset_dN;
     const int32_t mean_raw = self->quality.mean_mN / scale_mN(self);
     if (!self->wheel_offset_heard || self->quality.window != IW_WINDOW_GOOD) {
@@ -170,7 +170,7 @@ static void judge_evidence(iw_force_t *self) {
 /// any force to the shaft during the first two seconds"). If the start was not observed, the offset is used.
 static void settle(iw_force_t *self, iw_time_us_t now_us) {
     const bool trusted = !self->boot_seen || self->quality.window == IW_WINDOW_GOOD;
-    judge_evidence(self);
+    judge_unit(self);
     if (self->wheel_offset_heard && trusted && self->provenance < IW_OFFSET_OPERATOR) {
         adopt(self, now_us, IW_OFFSET_WHEEL, self->wheel_offset_dN * 100);
     }

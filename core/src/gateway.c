@@ -150,7 +150,7 @@ iw_refusal_t iw_gateway_drive(iw_gateway_t *self, iw_time_us_t sent_us, iw_clien
         // A request that is refused for its values still shows that a client wants motion: arm and reset are refused
         // for some time.
         if (nonzero) {
-            iw_permit_remember(&self->permit, sent_us, client);
+            iw_permit_note_command(&self->permit, sent_us, client);
         }
         self->counters.out_of_range += (wrong == IW_REFUSE_OUT_OF_RANGE) ? 1U : 0U;
         return wrong;

@@ -89,8 +89,8 @@ static void compare_ticks(iw_observation_wheel_t *self, iw_gateway_t *gateway, c
     self->open = true;
 }
 
-static void look_at_ratio(iw_observation_wheel_t *self, iw_gateway_t *gateway, const iw_snapshot_t *seen,
-                          const iw_snapshot_wheel_t *wheel) {
+static void check_ratio(iw_observation_wheel_t *self, iw_gateway_t *gateway, const iw_snapshot_t *seen,
+                        const iw_snapshot_wheel_t *wheel) {
     if (wheel->reboots != self->reboots) {
         self->reboots = wheel->reboots;
         self->open = false;
@@ -104,8 +104,8 @@ static void look_at_ratio(iw_observation_wheel_t *self, iw_gateway_t *gateway, c
     }
 }
 
-static void look_at_type(iw_observation_wheel_t *self, iw_gateway_t *gateway, const iw_snapshot_t *seen,
-                         const iw_snapshot_wheel_t *wheel, int16_t applied) {
+static void check_type(iw_observation_wheel_t *self, iw_gateway_t *gateway, const iw_snapshot_t *seen,
+                       const iw_snapshot_wheel_t *wheel, int16_t applied) {
     const int32_t measured = wheel->speed_mm_s;
     const int32_t expected = applied * (int32_t)seen->config->radius_mm / IW_SETPOINT_RADIUS_MM;
     const int32_t slack = iw_abs(expected) * 15 / 100 + (int32_t)wheel->um_s_per_rpm / 1000 + 1;
@@ -151,7 +151,7 @@ static void judge_pose(iw_observation_t *self, iw_gateway_t *gateway, const iw_s
     self->reversed = 0;
 }
 
-static void look_at_pose(iw_observation_t *self, iw_gateway_t *gateway, const iw_snapshot_t *seen) {
+static void check_pose(iw_observation_t *self, iw_gateway_t *gateway, const iw_snapshot_t *seen) {
     const iw_codec_pose_t was = self->pose;
     const iw_codec_pose_t is = seen->wheel[IW_RIGHT].told->pose;
     const iw_codec_pose_t was_reversed = reversed_pose(&was);
@@ -175,8 +175,8 @@ static void look_at_pose(iw_observation_t *self, iw_gateway_t *gateway, const iw
 void iw_observation_step(iw_observation_t *self, iw_gateway_t *gateway, const iw_snapshot_t *seen) {
     for (size_t side = 0; side < IW_SIDES; side++) {
         const iw_snapshot_wheel_t *const wheel = &seen->wheel[side];
-        look_at_ratio(&self->wheel[side], gateway, seen, wheel);
-        look_at_type(&self->wheel[side], gateway, seen, wheel, seen->applied.wheel[side].speed_mm_s);
+        check_ratio(&self->wheel[side], gateway, seen, wheel);
+        check_type(&self->wheel[side], gateway, seen, wheel, seen->applied.wheel[side].speed_mm_s);
     }
-    look_at_pose(self, gateway, seen);
+    check_pose(self, gateway, seen);
 }

@@ -134,9 +134,9 @@ static void brake_after(iw_permit_t *self, iw_cause_t cause, iw_time_us_t now_us
 static void latch(iw_permit_t *self, const iw_event_t *event, iw_time_us_t now_us) {
     record_stop(self, event, now_us);
     self->stop.latched = true;
-    const bool silent = self->phase == IW_PHASE_LISTENING;
+    const bool was_listening = self->phase == IW_PHASE_LISTENING;
     end_arming(self, (iw_refusal_t)iw_cause_rows[event->cause].refusal);
-    self->phase = silent ? IW_PHASE_LATCHED : IW_PHASE_CUT;
+    self->phase = was_listening ? IW_PHASE_LATCHED : IW_PHASE_CUT;
     // The client that released the hold before did not know of this latch.
     self->until_release = self->latch_until_release;
     self->at_once = is_at_once(event);
@@ -166,7 +166,7 @@ static void count_stranger(iw_permit_t *self) {
 }
 
 /// Handles a cause that neither latches nor stops a holder: it ends arming.
-static void bear(iw_permit_t *self, iw_cause_t cause) {
+static void tolerate(iw_permit_t *self, iw_cause_t cause) {
     end_arming(self, (iw_refusal_t)iw_cause_rows[cause].refusal);
 }
 
@@ -205,11 +205,11 @@ void iw_permit_raise(iw_permit_t *self, const iw_event_t *event, iw_time_us_t no
     } else if (self->phase == IW_PHASE_RESTARTING && cause == IW_CAUSE_SECOND_MASTER) {
         count_stranger(self);
     } else {
-        bear(self, cause);
+        tolerate(self, cause);
     }
 }
 
-void iw_permit_keep_present(iw_permit_t *self) {
+void iw_permit_retain_present(iw_permit_t *self) {
     self->raised |= self->present & (IW_CAUSE_BIT(IW_CAUSE_SEND_STALLED) | IW_CAUSE_BIT(IW_CAUSE_WHEEL_LOST));
 }
 
@@ -281,11 +281,11 @@ static void step_hold(iw_permit_t *self, iw_time_us_t now_us) {
     }
     const uint32_t held_us = iw_age_us(self->hold_us, now_us);
     // The end of zeros for a moving wheel is an event that the operator must see.
-    const bool gives_up = held_us >= longest_us(self) && !self->view.settled;
-    if (gives_up) {
+    const bool is_overdue = held_us >= longest_us(self) && !self->view.settled;
+    if (is_overdue) {
         self->still_moving++;
     }
-    if (gives_up || (held_us >= self->config->zero_hold_ms * IW_US_PER_MS && time_is_enough(self))) {
+    if (is_overdue || (held_us >= self->config->zero_hold_ms * IW_US_PER_MS && time_is_enough(self))) {
         self->phase = after_hold(self);
         // Setpoints that the dead process left in its controller do not count as a second master in the next hold.
         self->hold_us = now_us;
@@ -350,7 +350,7 @@ iw_refusal_t iw_permit_arm(iw_permit_t *self, iw_time_us_t now_us, iw_client_t c
 }
 
 /// Commands of several clients may arrive in another order than they were sent: the latest one counts.
-void iw_permit_remember(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client) {
+void iw_permit_note_command(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client) {
     if (self->stale_us == IW_NEVER || now_us >= self->stale_us) {
         self->stale_us = now_us;
         self->stale_client = client;
@@ -360,7 +360,7 @@ void iw_permit_remember(iw_permit_t *self, iw_time_us_t now_us, iw_client_t clie
 iw_refusal_t iw_permit_drive(iw_permit_t *self, iw_time_us_t sent_us, iw_client_t client, bool nonzero) {
     // A refused command counts too: it shows that a client wants motion.
     if (nonzero) {
-        iw_permit_remember(self, sent_us, client);
+        iw_permit_note_command(self, sent_us, client);
     }
     const iw_refusal_t refusal = iw_refuse_drive(self, sent_us, client);
     if (refusal == IW_REFUSE_NONE) {

@@ -51,7 +51,7 @@ static iw_refusal_t refuse_sending(const iw_permit_t *self, iw_time_us_t now_us)
     if (!self->view.timing_ok) {
         return IW_REFUSE_TIMING_MISMATCH;
     }
-    if (!self->view.heard) {
+    if (!self->view.online) {
         return IW_REFUSE_WHEEL_LOST;
     }
     return (self->phase == IW_PHASE_RESTARTING) ? IW_REFUSE_CAUSE_PRESENT : IW_REFUSE_NONE;
@@ -115,7 +115,7 @@ iw_refusal_t iw_refuse_reset(const iw_permit_t *self, iw_time_us_t now_us) {
     if (present != IW_REFUSE_NONE) {
         return present;
     }
-    if (!self->view.heard) {
+    if (!self->view.online) {
         return IW_REFUSE_WHEEL_LOST;
     }
     // In LATCHED the ramp with one wheel offline continues, and it may end below `rest_rpm`.

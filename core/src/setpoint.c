@@ -182,9 +182,9 @@ static void limit_yaw(const iw_setpoint_t *self, step_t *step, uint32_t us) {
         return;
     }
     if (iw_abs(braked) <= bound) {
-        cut_step(step, false, portion_of(iw_yaw_room(bound, braked, faster), (uint32_t)iw_abs(faster)));
+        cut_step(step, false, portion_of(iw_yaw_margin(bound, braked, faster), (uint32_t)iw_abs(faster)));
     } else {
-        cut_step(step, true, portion_of(iw_yaw_room(bound, from, braking), (uint32_t)iw_abs(braking)));
+        cut_step(step, true, portion_of(iw_yaw_margin(bound, from, braking), (uint32_t)iw_abs(braking)));
         step->share[0] = 0;
     }
 }
@@ -226,7 +226,7 @@ static iw_time_us_t next_on_grid(const iw_setpoint_t *self, iw_time_us_t now_us)
     return (next_us >= now_us + IW_SETPOINT_SPACING_US) ? next_us : now_us + period_us;
 }
 
-iw_pair_t iw_setpoint_take(iw_setpoint_t *self, iw_time_us_t now_us) {
+iw_pair_t iw_setpoint_next(iw_setpoint_t *self, iw_time_us_t now_us) {
     const uint32_t elapsed_us = iw_age_us(self->last_us, now_us);
     if (!self->from_zero && !(arrived(self, IW_LEFT) && arrived(self, IW_RIGHT))) {
         advance(self, elapsed_us);

@@ -49,8 +49,7 @@ iw_force_validity_t iw_snapshot_force_validity(const iw_snapshot_t *self, iw_sid
     return validity;
 }
 
-static void look_at_wheel(const iw_gateway_t *self, iw_time_us_t now_us, iw_side_t side,
-                          iw_snapshot_wheel_t *out_wheel) {
+static void read_wheel(const iw_gateway_t *self, iw_time_us_t now_us, iw_side_t side, iw_snapshot_wheel_t *out_wheel) {
     const iw_wheel_t *const wheel = &self->wheel[side];
     const uint32_t rest_us = iw_wheel_rest_us(wheel, now_us); // More than 0 only if the wheel is online.
     out_wheel->told = &self->told[side];
@@ -66,7 +65,7 @@ static void look_at_wheel(const iw_gateway_t *self, iw_time_us_t now_us, iw_side
     out_wheel->at_rest = rest_us >= (uint32_t)self->config.rest_ms * IW_US_PER_MS;
 }
 
-static void look_at_permit(const iw_permit_t *permit, iw_time_us_t now_us, iw_snapshot_t *out_snapshot) {
+static void read_permit(const iw_permit_t *permit, iw_time_us_t now_us, iw_snapshot_t *out_snapshot) {
     out_snapshot->stop = &permit->stop;
     out_snapshot->seen_us = permit->seen_us;
     out_snapshot->armed_us = permit->armed_us;
@@ -92,12 +91,12 @@ void iw_gateway_snapshot(const iw_gateway_t *self, iw_time_us_t now_us, iw_snaps
     out_snapshot->assumed = self->assumptions.entry;
     out_snapshot->assumed_changes = self->assumptions.changes;
     out_snapshot->doubt = self->assumptions.doubt;
-    look_at_wheel(self, now_us, IW_LEFT, &out_snapshot->wheel[IW_LEFT]);
-    look_at_wheel(self, now_us, IW_RIGHT, &out_snapshot->wheel[IW_RIGHT]);
+    read_wheel(self, now_us, IW_LEFT, &out_snapshot->wheel[IW_LEFT]);
+    read_wheel(self, now_us, IW_RIGHT, &out_snapshot->wheel[IW_RIGHT]);
     out_snapshot->sent = &self->sender.sent;
     out_snapshot->stopped = self->sender.envelope.stopped;
     out_snapshot->stray_echoes = self->sender.confirmation.stray;
-    look_at_permit(&self->permit, now_us, out_snapshot);
+    read_permit(&self->permit, now_us, out_snapshot);
     out_snapshot->pose_us = self->pose_us;
     out_snapshot->waiting_us = iw_confirmation_waiting_us(confirmation);
     out_snapshot->confirmed_us = iw_confirmation_proven_us(confirmation);

@@ -35,7 +35,7 @@ static void excuse_wheel(iw_gateway_t *self, iw_side_t side) {
 
 /// Returns the lateness of the step, at most UINT32_MAX. A suspend of the system counts, because the clock may stop
 /// while the wheels do not.
-static uint32_t take_lateness(iw_gateway_t *self) {
+static uint32_t read_lateness(iw_gateway_t *self) {
     const iw_time_us_t late_us = (self->now_us > self->promised_us) ? self->now_us - self->promised_us : 0U;
     const iw_time_us_t both_us = self->suspended_us + late_us;
     self->suspended_us = 0;
@@ -45,7 +45,7 @@ static uint32_t take_lateness(iw_gateway_t *self) {
 /// R7: judges one long stall and a run of late steps. Both count by the time in which no fault could be judged, because
 /// telemetry in a late step has no known reception time.
 static void watch_loop(iw_gateway_t *self) {
-    const uint32_t late_us = take_lateness(self);
+    const uint32_t late_us = read_lateness(self);
     const bool late = late_us > IW_GATEWAY_LATE_US;
     const bool was_stalled = self->stalled;
     self->stalled = late || (was_stalled && self->backlog);
@@ -108,16 +108,16 @@ static void note_force_observation(iw_gateway_t *self, iw_side_t side) {
     }
 }
 
-static void hear_force(iw_gateway_t *self, iw_codec_kind_t kind, iw_side_t side) {
-    const iw_codec_wheel_t *const told = &self->told[side];
+static void receive_force(iw_gateway_t *self, iw_codec_kind_t kind, iw_side_t side) {
+    const iw_codec_wheel_t *const values = &self->told[side];
     iw_force_t *const force = &self->force[side];
     const iw_unit_observation_t before = force->observation;
     if (kind == IW_CODEC_FORCE) {
         // Uses the last speed at any age: a stall of the gateway does not mean that the wheel moved.
-        const bool still = iw_abs(told->speed.speed_rpm) <= self->config.rest_rpm;
-        iw_force_receive(force, self->now_us, told->force.force_raw, still);
+        const bool still = iw_abs(values->speed.speed_rpm) <= self->config.rest_rpm;
+        iw_force_receive(force, self->now_us, values->force.force_raw, still);
     } else {
-        iw_force_receive_offset(force, self->now_us, told->offset.offset_dN);
+        iw_force_receive_offset(force, self->now_us, values->offset.offset_dN);
     }
     if (force->observation != before) {
         note_force_observation(self, side);
@@ -144,12 +144,12 @@ static void note_length(iw_gateway_t *self, iw_codec_kind_t kind, uint8_t length
 
 /// Handles telemetry. A reboot is handled first: the frame that reveals it may be the first force or offset of the new
 /// run, which belongs to a new window.
-static void hear(iw_gateway_t *self, iw_codec_kind_t kind, iw_side_t side) {
+static void receive_telemetry(iw_gateway_t *self, iw_codec_kind_t kind, iw_side_t side) {
     iw_wheel_t *const wheel = &self->wheel[side];
     const bool first = wheel->first_us == IW_NEVER;
     self->counters.received++;
     iw_wheel_receive(wheel, self->now_us, kind, &self->told[side], !self->stalled);
-    const iw_reboot_t reboot = iw_wheel_take_reboot(wheel);
+    const iw_reboot_t reboot = iw_wheel_next_reboot(wheel);
     if (reboot != IW_REBOOT_NONE) {
         raise_cause(self, IW_CAUSE_WHEEL_REBOOTED, side_bit(side), (uint32_t)reboot);
     }
@@ -157,7 +157,7 @@ static void hear(iw_gateway_t *self, iw_codec_kind_t kind, iw_side_t side) {
         iw_force_reopen(&self->force[side], wheel->boot_seen);
     }
     if (kind == IW_CODEC_FORCE || kind == IW_CODEC_OFFSET) {
-        hear_force(self, kind, side);
+        receive_force(self, kind, side);
     } else if (kind == IW_CODEC_POSE) {
         self->pose_us = self->now_us;
     } else if (kind == IW_CODEC_SPEED) {
@@ -166,7 +166,7 @@ static void hear(iw_gateway_t *self, iw_codec_kind_t kind, iw_side_t side) {
 }
 
 /// With two masters on one bus, the wheels follow the last sender (fault 19).
-static void hear_foreign(iw_gateway_t *self, iw_side_t side, uint32_t id) {
+static void receive_foreign(iw_gateway_t *self, iw_side_t side, uint32_t id) {
     self->counters.foreign++;
     raise_cause(self, IW_CAUSE_SECOND_MASTER, side_bit(side), id);
 }
@@ -176,20 +176,20 @@ static bool is_setpoint_id(uint32_t id) {
 }
 
 /// Separates an echo, which is the core's own frame confirmed by the controller, from a setpoint of another sender.
-static void take_setpoint(iw_gateway_t *self, iw_side_t side, const iw_can_frame_t *frame) {
+static void receive_setpoint(iw_gateway_t *self, iw_side_t side, const iw_can_frame_t *frame) {
     if (frame->kind == IW_CAN_ECHO) {
         self->counters.echoes++;
         iw_confirmation_echo(&self->sender.confirmation, side, frame);
     } else {
-        hear_foreign(self, side, frame->id);
+        receive_foreign(self, side, frame->id);
     }
 }
 
-static void take_frame(iw_gateway_t *self, const iw_can_frame_t *frame) {
+static void receive_frame(iw_gateway_t *self, const iw_can_frame_t *frame) {
     const iw_side_t side = iw_codec_side(frame->id);
     // Checked before decoding: a foreign setpoint of any length must latch, even if it cannot be decoded.
     if (is_setpoint_id(frame->id)) {
-        take_setpoint(self, side, frame);
+        receive_setpoint(self, side, frame);
         return;
     }
     const iw_codec_kind_t kind = iw_codec_decode(frame, self->told);
@@ -206,7 +206,7 @@ static void take_frame(iw_gateway_t *self, const iw_can_frame_t *frame) {
         break;
     default:
         note_length(self, kind, frame->dlc);
-        hear(self, kind, side);
+        receive_telemetry(self, kind, side);
         break;
     }
 }
@@ -215,12 +215,12 @@ static void take_frame(iw_gateway_t *self, const iw_can_frame_t *frame) {
 /// step.
 static IW_APART void receive(iw_gateway_t *self) {
     iw_can_frame_t frame;
-    uint32_t taken = 0;
-    while (taken < IW_GATEWAY_DRAIN_MAX && self->hal.receive(self->hal.context, &frame) > 0) {
-        take_frame(self, &frame);
-        taken++;
+    uint32_t received = 0;
+    while (received < IW_GATEWAY_DRAIN_MAX && self->hal.receive(self->hal.context, &frame) > 0) {
+        receive_frame(self, &frame);
+        received++;
     }
-    self->backlog = taken == IW_GATEWAY_DRAIN_MAX;
+    self->backlog = received == IW_GATEWAY_DRAIN_MAX;
 }
 
 /// Returns the time for which a lost wheel has sent nothing; 0 if it is not lost.
@@ -232,7 +232,7 @@ static IW_APART uint32_t lost_for_ms(const iw_gateway_t *self, iw_side_t side) {
     return (wheel->received_us == IW_NEVER) ? UINT32_MAX : iw_age_us(wheel->received_us, self->now_us) / IW_US_PER_MS;
 }
 
-static void watch_silence(iw_gateway_t *self) {
+static void watch_presence(iw_gateway_t *self) {
     const uint32_t left_ms = lost_for_ms(self, IW_LEFT);
     const uint32_t right_ms = lost_for_ms(self, IW_RIGHT);
     const uint32_t left = (left_ms > 0U) ? IW_SIDES_LEFT : IW_SIDES_NONE;
@@ -333,25 +333,25 @@ static uint32_t both_rest_us(const iw_gateway_t *self) {
 /// rules need are computed once.
 static void judge_wheels(iw_gateway_t *self) {
     iw_permit_view_t *const view = &self->permit.view;
-    const bool heard =
+    const bool online =
         iw_wheel_online(&self->wheel[IW_LEFT], self->now_us) && iw_wheel_online(&self->wheel[IW_RIGHT], self->now_us);
     const iw_pair_t applied = iw_setpoint_applied(&self->setpoint);
     // A stalled step neither raises nor clears causes that depend on an age: the next step on time decides (R7).
     if (self->stalled) {
-        iw_permit_keep_present(&self->permit);
+        iw_permit_retain_present(&self->permit);
         iw_diverge_restart(&self->diverge, self->now_us);
     } else {
         watch_echo(self);
-        if (!heard) { // A wheel that is online is not lost.
-            watch_silence(self);
+        if (!online) { // A wheel that is online is not lost.
+            watch_presence(self);
         }
         watch_wheel(self, IW_LEFT, applied.wheel[IW_LEFT].speed_mm_s);
         watch_wheel(self, IW_RIGHT, applied.wheel[IW_RIGHT].speed_mm_s);
-        iw_watch_pair(self, &applied, heard);
+        iw_watch_pair(self, &applied, online);
         watch_rolling(self);
     }
-    const uint32_t rest_us = heard ? both_rest_us(self) : 0U;
-    view->heard = heard;
+    const uint32_t rest_us = online ? both_rest_us(self) : 0U;
+    view->online = online;
     view->applied = applied;
     view->at_rest = rest_us >= (uint32_t)self->config.rest_ms * IW_US_PER_MS;
     view->settled = rest_us >= IW_PERMIT_SETTLED_US;
@@ -374,7 +374,7 @@ static iw_send_result_t send_pair(iw_gateway_t *self) {
     if (!iw_sender_ready(&self->sender, zero)) {
         return IW_SEND_DONE;
     }
-    const iw_pair_t pair = iw_setpoint_take(&self->setpoint, self->now_us);
+    const iw_pair_t pair = iw_setpoint_next(&self->setpoint, self->now_us);
     const iw_send_result_t result = iw_sender_send(&self->sender, &pair, self->now_us, zero);
     if (result == IW_SEND_LATER) {
         iw_setpoint_collapse(&self->setpoint, self->now_us);
@@ -386,7 +386,7 @@ static iw_send_result_t send_pair(iw_gateway_t *self) {
 /// until a wheel gets power, and then it moves that wheel (fault 18). The core purges it, or reports `left_behind`,
 /// with or without telemetry, because a frame is stuck exactly when no wheel has power to acknowledge it. A late echo
 /// (`echo_ms`) or an echo in the backlog does not count as stuck yet.
-static void keep_silent(iw_gateway_t *self) {
+static void withdraw_setpoints(iw_gateway_t *self) {
     if (overdue_us(self) == 0U) {
         self->left_behind = false;
         return;
@@ -407,7 +407,7 @@ static void send_due(iw_gateway_t *self) {
     iw_setpoint_demand(&self->setpoint, self->now_us, demand);
     if (demand == IW_DEMAND_SILENCE) {
         iw_sender_rest(&self->sender);
-        keep_silent(self);
+        withdraw_setpoints(self);
         return;
     }
     self->rolling.setpoint_us = self->now_us;

@@ -29,10 +29,10 @@ static bool has_ended(const iw_gateway_t *self) {
     return demand < IW_DEMAND_BRAKE || (demand == IW_DEMAND_BRAKE && iw_setpoint_is_zero(&self->setpoint));
 }
 
-void iw_watch_pair(iw_gateway_t *self, const iw_pair_t *applied, bool heard) {
+void iw_watch_pair(iw_gateway_t *self, const iw_pair_t *applied, bool online) {
     iw_diverge_t *const diverge = &self->diverge;
     iw_diverge_begin(diverge, self->permit.armed_us);
-    if (has_ended(self) || !heard || self->setpoint.from_zero) {
+    if (has_ended(self) || !online || self->setpoint.from_zero) {
         iw_diverge_restart(diverge, self->now_us);
     } else {
         compare(self, applied);

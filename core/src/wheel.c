@@ -61,7 +61,7 @@ static void note_presence(iw_wheel_t *self, iw_time_us_t now_us) {
 
 /// Standstill needs a run of messages without a gap: one message after a gap does not show that the wheel did not move
 /// in between.
-static void hear_speed(iw_wheel_t *self, iw_time_us_t now_us, const iw_codec_speed_t *speed, bool fresh) {
+static void receive_speed(iw_wheel_t *self, iw_time_us_t now_us, const iw_codec_speed_t *speed, bool fresh) {
     const int32_t rest_rpm = self->config->rest_rpm;
     const int32_t speed_um_s = speed->speed_rpm * (int32_t)self->um_s_per_rpm;
     const bool gap = !iw_wheel_online(self, now_us);
@@ -86,7 +86,7 @@ static bool tick_jump(const iw_wheel_t *self, uint32_t delta, uint32_t elapsed_u
     return moved > IW_WHEEL_TICK_SLACK && moved - IW_WHEEL_TICK_SLACK > limit;
 }
 
-static void hear_status(iw_wheel_t *self, iw_time_us_t now_us, const iw_codec_status_t *status) {
+static void receive_status(iw_wheel_t *self, iw_time_us_t now_us, const iw_codec_status_t *status) {
     if (self->status_us != IW_NEVER) {
         const uint32_t delta = (uint32_t)status->odometry_ticks - (uint32_t)self->odometry_ticks;
         if (tick_jump(self, delta, iw_age_us(self->status_us, now_us))) {
@@ -100,22 +100,22 @@ static void hear_status(iw_wheel_t *self, iw_time_us_t now_us, const iw_codec_st
 }
 
 /// Judged after a stall of the gateway too: for a wheel that rebooted in the meantime there is no other sign.
-static void hear_offset(iw_wheel_t *self, iw_time_us_t now_us) {
+static void receive_offset(iw_wheel_t *self, iw_time_us_t now_us) {
     if (iw_age_us(self->offset_us, now_us) >= IW_WHEEL_OFFSET_BACK_US) {
         rebooted(self, IW_REBOOT_OFFSET_FRAMES, now_us);
     }
     self->offset_us = now_us;
 }
 
-void iw_wheel_receive(iw_wheel_t *self, iw_time_us_t now_us, iw_codec_kind_t kind, const iw_codec_wheel_t *told,
+void iw_wheel_receive(iw_wheel_t *self, iw_time_us_t now_us, iw_codec_kind_t kind, const iw_codec_wheel_t *values,
                       bool fresh) {
     note_presence(self, now_us);
     if (kind == IW_CODEC_SPEED) {
-        hear_speed(self, now_us, &told->speed, fresh);
+        receive_speed(self, now_us, &values->speed, fresh);
     } else if (kind == IW_CODEC_STATUS) {
-        hear_status(self, now_us, &told->status);
+        receive_status(self, now_us, &values->status);
     } else if (kind == IW_CODEC_OFFSET) {
-        hear_offset(self, now_us);
+        receive_offset(self, now_us);
     }
 }
 

@@ -35,8 +35,8 @@ int32_t iw_yaw_bound(const iw_yaw_t *self, int32_t from_um_s, uint32_t growth_um
     return (bound_um_s > now_um_s) ? bound_um_s : now_um_s;
 }
 
-uint32_t iw_yaw_room(int32_t bound_um_s, int32_t from_um_s, int32_t change_um_s) {
+uint32_t iw_yaw_margin(int32_t bound_um_s, int32_t from_um_s, int32_t change_um_s) {
     const int32_t from = (change_um_s < 0) ? -from_um_s : from_um_s;
-    const int32_t room = bound_um_s - from - ROUNDING_UM_S;
-    return (room > 0) ? (uint32_t)room : 0U;
+    const int32_t margin = bound_um_s - from - ROUNDING_UM_S;
+    return (margin > 0) ? (uint32_t)margin : 0U;
 }

@@ -190,7 +190,7 @@ static unsigned last_line(const unsigned *lines) {
 }
 
 /// Lists each fix of the budget alone, as far as the range of its key allows.
-static void budget_cures(const iw_config_t *core, char *out, size_t size) {
+static void budget_fixes(const iw_config_t *core, char *out, size_t size) {
     const uint32_t spent = (uint32_t)core->lease_ms + core->period_ms;
     const uint32_t ramp_ms = ((uint32_t)core->max_speed_mm_s * 1000U + core->decel_mm_s2 - 1U) / core->decel_mm_s2;
     const uint32_t left_ms = WATCHDOG_MS - spent;
@@ -224,16 +224,16 @@ static void complain_rest(settings_report_t *report, const iw_config_t *core, un
 static void relate(settings_report_t *report, const void *values, const unsigned *lines) {
     const iw_config_t *core = &((const gateway_config_t *)values)->core;
     config_relate_contacts(values, report, line_of("line2", lines), line_of("estop_discrepancy_ms", lines));
-    char cures[SETTINGS_MESSAGE_SIZE];
+    char fixes[SETTINGS_MESSAGE_SIZE];
     const iw_config_fault_t fault = iw_config_check(core);
     if (fault == IW_CONFIG_STOP_BUDGET) {
-        budget_cures(core, cures, sizeof cures);
+        budget_fixes(core, fixes, sizeof fixes);
         settings_complain(
             report, last_line(lines),
             "after a lost client the wheels would need lease_ms %u + period_ms %u + max_speed_mm_s %u / decel_mm_s2 %u "
             "= %u ms to stop, more than the %u ms of their own watchdog; %s",
             core->lease_ms, core->period_ms, core->max_speed_mm_s, core->decel_mm_s2,
-            (unsigned)iw_config_stop_budget(core).client_lost_ms, WATCHDOG_MS, cures);
+            (unsigned)iw_config_stop_budget(core).client_lost_ms, WATCHDOG_MS, fixes);
     } else if (fault == IW_CONFIG_REST_SPEED) {
         complain_rest(report, core, line_of("rest_rpm", lines));
     } else if (fault == IW_CONFIG_MIN_CURRENT) {

@@ -266,8 +266,8 @@ const char *inspect_assumption_cost(iw_assumption_item_t item) {
     return ((unsigned)item < IW_ASSUMPTION_ITEMS) ? costs[item] : "unknown";
 }
 
-const char *inspect_assumption_cure(iw_assumption_item_t item) {
-    static const char *const cures[IW_ASSUMPTION_ITEMS] = {
+const char *inspect_assumption_fix(iw_assumption_item_t item) {
+    static const char *const fixes[IW_ASSUMPTION_ITEMS] = {
         [IW_ASSUMPTION_SETPOINT_TYPE] =
             "correct setpoint_type under [wheels] (iwheelctl bringup finds it), then: systemctl "
             "restart iwheel-gateway",
@@ -293,6 +293,6 @@ const char *inspect_assumption_cure(iw_assumption_item_t item) {
         [IW_ASSUMPTION_DLC] = "find the device that sends on the wheels' ids (iwheelctl watch frame shows them); when "
                               "it is gone: iwheelctl confirm dlc",
     };
-    const char *cure = ((unsigned)item < IW_ASSUMPTION_ITEMS) ? cures[item] : NULL;
-    return (cure != NULL) ? cure : "decide it: iwheelctl ledger shows it, iwheelctl confirm stores the right value";
+    const char *fix = ((unsigned)item < IW_ASSUMPTION_ITEMS) ? fixes[item] : NULL;
+    return (fix != NULL) ? fix : "decide it: iwheelctl ledger shows it, iwheelctl confirm stores the right value";
 }

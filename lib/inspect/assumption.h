@@ -57,6 +57,6 @@ void inspect_assumption_source(iw_assumption_item_t item, const iw_assumption_en
 const char *inspect_assumption_cost(iw_assumption_item_t item);
 
 /// Returns how to decide a contradiction, with the command for it. It applies to every value.
-const char *inspect_assumption_cure(iw_assumption_item_t item);
+const char *inspect_assumption_fix(iw_assumption_item_t item);
 
 #endif

@@ -28,14 +28,14 @@ void inspect_say(inspect_findings_t *self, const char *check, inspect_verdict_t 
     va_end(arguments);
 }
 
-void inspect_cure(inspect_findings_t *self, const char *format, ...) {
+void inspect_fix(inspect_findings_t *self, const char *format, ...) {
     if (self->count == 0U || self->lost > 0U) {
         return;
     }
     inspect_finding_t *finding = &self->finding[self->count - 1U];
     va_list arguments;
     va_start(arguments, format);
-    (void)vsnprintf(finding->cure, sizeof finding->cure, format, arguments);
+    (void)vsnprintf(finding->fix, sizeof finding->fix, format, arguments);
     va_end(arguments);
 }
 
@@ -46,7 +46,7 @@ const char *inspect_verdict_word(inspect_verdict_t verdict) {
 }
 
 void inspect_sentence(const inspect_finding_t *finding, char *out_text, size_t size) {
-    (void)snprintf(out_text, size, "%s%s%s", finding->text, (finding->cure[0] != '\0') ? "; " : "", finding->cure);
+    (void)snprintf(out_text, size, "%s%s%s", finding->text, (finding->fix[0] != '\0') ? "; " : "", finding->fix);
 }
 
 /// Interval of reading the bus without a wake-up: unknown ids arrive through a socket that is not watched.
@@ -65,11 +65,11 @@ unsigned inspect_message_of(uint32_t id) {
     return (row != NULL) ? (unsigned)(row - iw_codec_rows) : IW_CODEC_ROWS;
 }
 
-void inspect_heard_begin(inspect_heard_t *self) {
-    *self = (inspect_heard_t){.estop = -1, .worst = IW_BUS_ACTIVE, .last = IW_BUS_ACTIVE};
+void inspect_traffic_begin(inspect_traffic_t *self) {
+    *self = (inspect_traffic_t){.estop = -1, .worst = IW_BUS_ACTIVE, .last = IW_BUS_ACTIVE};
 }
 
-static void note_stranger(inspect_heard_t *self, uint32_t id) {
+static void note_stranger(inspect_traffic_t *self, uint32_t id) {
     self->strange++;
     for (uint32_t i = 0; i < self->strange_ids; i++) {
         if (self->strange_id[i] == id) {
@@ -81,13 +81,13 @@ static void note_stranger(inspect_heard_t *self, uint32_t id) {
     }
 }
 
-void inspect_heard_take(inspect_heard_t *self, const iw_can_frame_t *frame) {
-    iw_codec_wheel_t told[IW_SIDES];
+void inspect_traffic_count(inspect_traffic_t *self, const iw_can_frame_t *frame) {
+    iw_codec_wheel_t values[IW_SIDES];
     self->bits += iwl_bus_frame_bits(frame);
     if (frame->kind == (uint8_t)IW_CAN_ECHO) {
         return;
     }
-    switch (iw_codec_decode(frame, told)) {
+    switch (iw_codec_decode(frame, values)) {
     case IW_CODEC_BAD_LENGTH:
         self->bad_length++;
         break;
@@ -103,40 +103,40 @@ void inspect_heard_take(inspect_heard_t *self, const iw_can_frame_t *frame) {
     }
 }
 
-static void look(iwl_hal_t *hal, iw_time_us_t now_us, bool counting, inspect_heard_t *heard) {
+static void poll_bus(iwl_hal_t *hal, iw_time_us_t now_us, bool counting, inspect_traffic_t *traffic) {
     iw_can_frame_t frame;
     iwl_hal_poll(hal, now_us);
     const iw_bus_state_t state = iwl_bus_state(&hal->bus);
-    heard->was_up = heard->was_up || state >= IW_BUS_PASSIVE;
-    if (state < heard->worst) {
-        heard->worst = state;
+    traffic->was_up = traffic->was_up || state >= IW_BUS_PASSIVE;
+    if (state < traffic->worst) {
+        traffic->worst = state;
     }
-    heard->last = state;
-    heard->estop = iwl_hal_pressed(hal);
+    traffic->last = state;
+    traffic->estop = iwl_hal_pressed(hal);
     while (iwl_bus_receive(&hal->bus, &frame) > 0) {
         if (counting) {
-            inspect_heard_take(heard, &frame);
+            inspect_traffic_count(traffic, &frame);
         }
     }
 }
 
-void inspect_listen(iwl_hal_t *hal, iw_time_us_t for_us, inspect_heard_t *out_heard) {
-    inspect_heard_begin(out_heard);
+void inspect_listen(iwl_hal_t *hal, iw_time_us_t for_us, inspect_traffic_t *out_traffic) {
+    inspect_traffic_begin(out_traffic);
     struct pollfd wait = {.fd = iwl_hal_bus_fd(hal), .events = POLLIN};
-    look(hal, iwl_clock_now_us(), false, out_heard); // Frames from before the first reading have no time.
+    poll_bus(hal, iwl_clock_now_us(), false, out_traffic); // Frames from before the first reading have no time.
     const iw_time_us_t begin_us = iwl_clock_now_us();
     for (iw_time_us_t now_us = begin_us; now_us < begin_us + for_us; now_us = iwl_clock_now_us()) {
-        look(hal, now_us, true, out_heard);
+        poll_bus(hal, now_us, true, out_traffic);
         (void)poll(&wait, 1, LOOK_MS);
     }
-    out_heard->span_us = iwl_clock_now_us() - begin_us;
+    out_traffic->span_us = iwl_clock_now_us() - begin_us;
 }
 
-uint32_t inspect_rate_mHz(const inspect_heard_t *self, unsigned message) {
+uint32_t inspect_rate_mHz(const inspect_traffic_t *self, unsigned message) {
     return (self->span_us == 0U) ? 0U : (uint32_t)((uint64_t)self->count[message] * 1000U * 1000000U / self->span_us);
 }
 
-uint32_t inspect_load_permille(const inspect_heard_t *self, uint32_t bitrate_hz) {
+uint32_t inspect_load_permille(const inspect_traffic_t *self, uint32_t bitrate_hz) {
     if (self->span_us == 0U || bitrate_hz == 0U) {
         return 0U;
     }

@@ -20,7 +20,7 @@
 /// Limit of findings, above that of all judges together. Further findings are only counted.
 #define INSPECT_FINDINGS_MAX 40U
 #define INSPECT_TEXT_SIZE    320U
-#define INSPECT_CURE_SIZE    320U
+#define INSPECT_FIX_SIZE     320U
 
 /// INSPECT_SKIP: this machine has no such device to check.
 typedef enum { INSPECT_OK = 0, INSPECT_WARN, INSPECT_FAIL, INSPECT_SKIP } inspect_verdict_t;
@@ -30,7 +30,7 @@ typedef struct {
     const char *check; ///< Subject: a word of a closed list (docs/user/doctor.md).
     inspect_verdict_t verdict;
     char text[INSPECT_TEXT_SIZE]; ///< State.
-    char cure[INSPECT_CURE_SIZE]; ///< Fix; empty if there is nothing to fix.
+    char fix[INSPECT_FIX_SIZE];   ///< Fix; empty if there is nothing to fix.
 } inspect_finding_t;
 
 typedef struct {
@@ -48,7 +48,7 @@ __attribute__((format(printf, 4, 5))) void inspect_say(inspect_findings_t *self,
                                                        inspect_verdict_t verdict, const char *format, ...);
 
 /// Sets the fix of the last finding.
-__attribute__((format(printf, 2, 3))) void inspect_cure(inspect_findings_t *self, const char *format, ...);
+__attribute__((format(printf, 2, 3))) void inspect_fix(inspect_findings_t *self, const char *format, ...);
 
 /// Returns "ok", "warn", "fail" or "skip".
 const char *inspect_verdict_word(inspect_verdict_t verdict);
@@ -80,23 +80,23 @@ typedef struct {
     iw_bus_state_t worst;                   ///< Worst state of the bus ...
     iw_bus_state_t last;                    ///< ... and the last one.
     int estop;                              ///< Last result of the e-stop, as in iw_hal_t.
-} inspect_heard_t;
+} inspect_traffic_t;
 
-void inspect_heard_begin(inspect_heard_t *self);
+void inspect_traffic_begin(inspect_traffic_t *self);
 
-void inspect_heard_take(inspect_heard_t *self, const iw_can_frame_t *frame);
+void inspect_traffic_count(inspect_traffic_t *self, const iw_can_frame_t *frame);
 
 /// Receives for this time. It blocks. The HAL must be open.
-void inspect_listen(iwl_hal_t *hal, iw_time_us_t for_us, inspect_heard_t *out_heard);
+void inspect_listen(iwl_hal_t *hal, iw_time_us_t for_us, inspect_traffic_t *out_traffic);
 
 /// Returns the rate of a message, as frames per 1000 s.
-uint32_t inspect_rate_mHz(const inspect_heard_t *self, unsigned message);
+uint32_t inspect_rate_mHz(const inspect_traffic_t *self, unsigned message);
 
 /// Returns the index of the message with this id; IW_CODEC_ROWS if there is none.
 unsigned inspect_message_of(uint32_t id);
 
 /// Returns the share of the bus that all frames used.
-uint32_t inspect_load_permille(const inspect_heard_t *self, uint32_t bitrate_hz);
+uint32_t inspect_load_permille(const inspect_traffic_t *self, uint32_t bitrate_hz);
 
 // --- the judges --------------------------------------------------------------------------------------------------
 
@@ -116,7 +116,7 @@ void inspect_link(const iwl_bus_link_t *link, const inspect_config_t *config, in
 void inspect_room(const iwl_bus_link_t *link, inspect_findings_t *findings);
 
 /// Judges activity, both wheels and the rate of each id, load, unknown ids, damaged frames, and other masters.
-void inspect_bus(const iwl_bus_link_t *link, const inspect_heard_t *heard, const inspect_config_t *config,
+void inspect_bus(const iwl_bus_link_t *link, const inspect_traffic_t *traffic, const inspect_config_t *config,
                  inspect_findings_t *findings);
 
 /// State of the e-stop.

@@ -8,12 +8,12 @@
 #define BYTES_PER_MS 16384U
 
 /// Writes the commands that configure the interface for the wheels.
-static void cure_timing(const inspect_config_t *config, inspect_findings_t *findings) {
+static void fix_timing(const inspect_config_t *config, inspect_findings_t *findings) {
     const char *bus = config->name;
-    inspect_cure(findings,
-                 "set it: ip link set %s down; ip link set %s type can bitrate %" PRIu32
-                 " sample-point 0.%03u restart-ms 100; ip link set %s txqueuelen %u; ip link set %s up",
-                 bus, bus, config->bitrate_hz, config->sample_point_permille, bus, IWL_LINK_QUEUE_MAX, bus);
+    inspect_fix(findings,
+                "set it: ip link set %s down; ip link set %s type can bitrate %" PRIu32
+                " sample-point 0.%03u restart-ms 100; ip link set %s txqueuelen %u; ip link set %s up",
+                bus, bus, config->bitrate_hz, config->sample_point_permille, bus, IWL_LINK_QUEUE_MAX, bus);
 }
 
 static void judge_presence(const iwl_bus_link_t *link, const inspect_config_t *config, inspect_findings_t *findings) {
@@ -21,19 +21,19 @@ static void judge_presence(const iwl_bus_link_t *link, const inspect_config_t *c
     switch (link->presence) {
     case IWL_LINK_ABSENT:
         inspect_say(findings, "interface", INSPECT_FAIL, "bus %s: there is no such interface", bus);
-        inspect_cure(findings, "plug the adapter in, or name the right one in [bus] interface: ip -brief link show "
-                               "type can");
+        inspect_fix(findings, "plug the adapter in, or name the right one in [bus] interface: ip -brief link show "
+                              "type can");
         break;
     case IWL_LINK_NOT_CAN:
         inspect_say(findings, "interface", INSPECT_FAIL, "bus %s: not a CAN interface", bus);
-        inspect_cure(findings, "name the right one in [bus] interface: ip -brief link show type can");
+        inspect_fix(findings, "name the right one in [bus] interface: ip -brief link show type can");
         break;
     case IWL_LINK_DOWN:
         inspect_say(findings, "interface", INSPECT_FAIL, "bus %s: the interface is down", bus);
         if (link->is_virtual) {
-            inspect_cure(findings, "ip link set %s up", bus);
+            inspect_fix(findings, "ip link set %s up", bus);
         } else {
-            cure_timing(config, findings);
+            fix_timing(config, findings);
         }
         break;
     default:
@@ -46,8 +46,8 @@ static void judge_mode(const iwl_bus_link_t *link, const inspect_config_t *confi
     const char *bus = config->name;
     if (link->is_mute) {
         inspect_say(findings, "mode", INSPECT_FAIL, "%s is in listen-only mode and cannot send", bus);
-        inspect_cure(findings, "ip link set %s down; ip link set %s type can listen-only off; ip link set %s up", bus,
-                     bus, bus);
+        inspect_fix(findings, "ip link set %s down; ip link set %s type can listen-only off; ip link set %s up", bus,
+                    bus, bus);
     }
 }
 
@@ -74,7 +74,7 @@ static void judge_timing(const iwl_bus_link_t *link, const inspect_config_t *con
                 "bit timing: %s, sample point %s; wanted %" PRIu32 " bit/s, %u.%u %%", bitrate, sample_point,
                 config->bitrate_hz, config->sample_point_permille / 10U, config->sample_point_permille % 10U);
     if (timing != IWL_TIMING_RIGHT) {
-        cure_timing(config, findings);
+        fix_timing(config, findings);
     }
 }
 
@@ -85,7 +85,7 @@ static void judge_queue(const iwl_bus_link_t *link, const inspect_config_t *conf
     inspect_say(findings, "queue", INSPECT_WARN,
                 "queue of %s: %" PRIu32 " frames may wait in it, and be old when a dead bus revives", config->name,
                 link->queue_length);
-    inspect_cure(findings, "ip link set %s txqueuelen %u", config->name, IWL_LINK_QUEUE_MAX);
+    inspect_fix(findings, "ip link set %s txqueuelen %u", config->name, IWL_LINK_QUEUE_MAX);
 }
 
 static void judge_restart(const iwl_bus_link_t *link, const inspect_config_t *config, inspect_findings_t *findings) {
@@ -94,8 +94,8 @@ static void judge_restart(const iwl_bus_link_t *link, const inspect_config_t *co
         return;
     }
     inspect_say(findings, "restart", INSPECT_WARN, "after bus-off %s stays off until a person restarts it", bus);
-    inspect_cure(findings, "ip link set %s down; ip link set %s type can restart-ms 100; ip link set %s up", bus, bus,
-                 bus);
+    inspect_fix(findings, "ip link set %s down; ip link set %s type can restart-ms 100; ip link set %s up", bus, bus,
+                bus);
 }
 
 static void judge_echo(const iwl_bus_link_t *link, const inspect_config_t *config, inspect_findings_t *findings) {
@@ -104,7 +104,7 @@ static void judge_echo(const iwl_bus_link_t *link, const inspect_config_t *confi
     }
     inspect_say(findings, "echo", INSPECT_WARN,
                 "the echo of %s is unproven: whether a setpoint was on the bus cannot be known", config->name);
-    inspect_cure(findings, "use an adapter whose driver has IFF_ECHO (most have; vcan and slcan have not)");
+    inspect_fix(findings, "use an adapter whose driver has IFF_ECHO (most have; vcan and slcan have not)");
 }
 
 void inspect_room(const iwl_bus_link_t *link, inspect_findings_t *findings) {
@@ -117,7 +117,7 @@ void inspect_room(const iwl_bus_link_t *link, inspect_findings_t *findings) {
                 link->room_bytes / 2U / 1024U, IWL_LINK_ROOM_BYTES / 1024U, link->room_bytes / BYTES_PER_MS,
                 granted ? "" : "; if other programs use the processor for longer, frames get lost");
     if (!granted) {
-        inspect_cure(findings, "sudo sysctl net.core.rmem_max=%u, and start the gateway again", IWL_LINK_ROOM_BYTES);
+        inspect_fix(findings, "sudo sysctl net.core.rmem_max=%u, and start the gateway again", IWL_LINK_ROOM_BYTES);
     }
 }
 

@@ -118,10 +118,10 @@ static uint64_t begin_block(blackbox_ring_t *self, uint64_t used, uint64_t numbe
 void blackbox_ring_put(blackbox_ring_t *self, const blackbox_entry_t *entry) {
     const uint64_t number = atomic_load_explicit(&self->written, memory_order_relaxed);
     uint64_t used = atomic_load_explicit(&self->used, memory_order_relaxed);
-    const size_t room = BLACKBOX_BLOCK - used % BLACKBOX_BLOCK;
+    const size_t space = BLACKBOX_BLOCK - used % BLACKBOX_BLOCK;
     const uint64_t begun_us = self->block[used / BLACKBOX_BLOCK % self->blocks].at_us;
     // One byte more, for the end.
-    if (number == 0U || room <= PACKED_MAX || entry->at_us - begun_us > OFFSET_MAX) {
+    if (number == 0U || space <= PACKED_MAX || entry->at_us - begun_us > OFFSET_MAX) {
         used = begin_block(self, used, number, entry->at_us);
     }
     blackbox_block_t *block = &self->block[used / BLACKBOX_BLOCK % self->blocks];

@@ -36,7 +36,7 @@ static int next_hex(const cursor_t *cursor, size_t ahead) {
 }
 
 /// Returns true and advances if the next character is `wanted`.
-static bool take(cursor_t *cursor, char wanted) {
+static bool accept(cursor_t *cursor, char wanted) {
     if (cursor->at == cursor->end || *cursor->at != wanted) {
         return false;
     }
@@ -56,14 +56,14 @@ static const char *parse_bytes(cursor_t *cursor, size_t most, candump_t *frame) 
         frame->data[frame->length] = (uint8_t)(next_hex(cursor, 0) * 16 + low);
         frame->length++;
         cursor->at += 2;
-        (void)take(cursor, '.'); // The form of cansend.
+        (void)accept(cursor, '.'); // The form of cansend.
     }
     return NULL;
 }
 
 /// Parses `_9`.. `_F` after 8 bytes: the length code on the bus. The length is 8.
 static const char *parse_raw_dlc(cursor_t *cursor, const candump_t *frame) {
-    if (!take(cursor, '_')) {
+    if (!accept(cursor, '_')) {
         return NULL;
     }
     if (frame->length != IW_CAN_DATA_MAX || next_hex(cursor, 0) <= (int)IW_CAN_DATA_MAX) {
@@ -99,10 +99,10 @@ static const char *parse_fd(cursor_t *cursor, candump_t *frame) {
 
 /// Parses the part after the first `#`. Returns NULL, or what is wrong.
 static const char *parse_data(cursor_t *cursor, candump_t *frame) {
-    if (take(cursor, '#')) {
+    if (accept(cursor, '#')) {
         return parse_fd(cursor, frame);
     }
-    if (take(cursor, 'R') || take(cursor, 'r')) {
+    if (accept(cursor, 'R') || accept(cursor, 'r')) {
         return parse_remote(cursor, frame);
     }
     const char *why = parse_bytes(cursor, IW_CAN_DATA_MAX, frame);
@@ -137,14 +137,14 @@ static const char *parse_time(cursor_t *cursor, candump_t *frame) {
     static const int64_t scale[] = {1000000, 100000, 10000, 1000, 100, 10, 1};
     int64_t seconds = 0;
     int64_t fraction = 0;
-    if (!take(cursor, '(')) {
+    if (!accept(cursor, '(')) {
         return "does not begin with a time in parentheses; record with candump -L or iwheelctl record";
     }
     const unsigned digits = take_digits(cursor, SECONDS_DIGITS, &seconds);
-    const bool dot = take(cursor, '.');
+    const bool dot = accept(cursor, '.');
     const unsigned decimals = dot ? take_digits(cursor, 6U, &fraction) : 0U;
     if (digits == 0U || digits > SECONDS_DIGITS || (dot && decimals == 0U) || decimals > FRACTION_DIGITS ||
-        !take(cursor, ')')) {
+        !accept(cursor, ')')) {
         return "the time is not (SECONDS.MICROSECONDS); record with candump -L or iwheelctl record";
     }
     frame->time_us = seconds * 1000000 + fraction * scale[(decimals < 6U) ? decimals : 6U];
@@ -153,6 +153,7 @@ static const char *parse_time(cursor_t *cursor, candump_t *frame) {
 
 static const char *parse_interface(cursor_t *cursor, candump_t *frame) {
     size_t length = 0;
+    bool ascii = true;
     (void)skip_blanks(cursor);
     for (; cursor->at < cursor->end && !is_blank(*cursor->at); cursor->at++) {
         const unsigned char c = (unsigned char)*cursor->at;
@@ -161,14 +162,15 @@ static const char *parse_interface(cursor_t *cursor, candump_t *frame) {
         }
         frame->interface[length] = *cursor->at;
         length++;
+        ascii = ascii && c < 0x80U;
     }
-    if (!iwn_plain_text(frame->interface)) {
+    if (!ascii && !iwn_plain_text(frame->interface)) {
         return "the interface name holds characters that move a terminal; is the line damaged?";
     }
     return (length == 0U || !skip_blanks(cursor)) ? "ends behind the time or the interface; is the line cut?" : NULL;
 }
 
-static const char *take_id(candump_t *frame, uint32_t number, unsigned digits) {
+static const char *read_id(candump_t *frame, uint32_t number, unsigned digits) {
     frame->error = digits == EXTENDED_DIGITS && (number & ERROR_FLAG) != 0U;
     frame->extended = digits == EXTENDED_DIGITS && !frame->error;
     frame->id = frame->error ? number & ~ERROR_FLAG : number;
@@ -188,12 +190,12 @@ static const char *parse_id(cursor_t *cursor, candump_t *frame) {
         number = number << 4U | (uint32_t)hex(*cursor->at);
         digits++;
     }
-    if (!take(cursor, '#')) {
+    if (!accept(cursor, '#')) {
         return (digits > 0U && (cursor->at == cursor->end || is_blank(*cursor->at)))
                    ? "no # behind the id: this is candump's screen form; record with candump -L or iwheelctl record"
                    : "no hexadecimal id with a # behind it; is the line damaged?";
     }
-    return take_id(frame, number, digits);
+    return read_id(frame, number, digits);
 }
 
 static const char *parse_mark(cursor_t *cursor, candump_t *frame) {
@@ -201,9 +203,9 @@ static const char *parse_mark(cursor_t *cursor, candump_t *frame) {
     if (cursor->at == cursor->end) {
         return NULL;
     }
-    if (apart && (take(cursor, 'R') || take(cursor, 'r'))) {
+    if (apart && (accept(cursor, 'R') || accept(cursor, 'r'))) {
         frame->mark = CANDUMP_RECEIVED;
-    } else if (apart && (take(cursor, 'T') || take(cursor, 't'))) {
+    } else if (apart && (accept(cursor, 'T') || accept(cursor, 't'))) {
         frame->mark = CANDUMP_SENT;
     }
     (void)skip_blanks(cursor);

@@ -37,9 +37,9 @@ static void fill(candump_reader_t *self) {
 static const char *find_newline(candump_reader_t *self) {
     for (;;) {
         const size_t there = self->end - self->begin;
-        const size_t looked = (there < CANDUMP_READ_MAX) ? there : CANDUMP_READ_MAX;
-        const char *newline = memchr(&self->buffer[self->begin], '\n', looked);
-        if (newline != NULL || self->ended || looked == CANDUMP_READ_MAX) {
+        const size_t searched = (there < CANDUMP_READ_MAX) ? there : CANDUMP_READ_MAX;
+        const char *newline = memchr(&self->buffer[self->begin], '\n', searched);
+        if (newline != NULL || self->ended || searched == CANDUMP_READ_MAX) {
             return newline;
         }
         fill(self);

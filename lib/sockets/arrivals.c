@@ -18,7 +18,7 @@ typedef struct {
 } newcomer_t;
 
 /// Returns the socket at which a client beyond the maximum arrived.
-static sock_right_t door_of(const sock_clients_t *self, const sock_client_t *client) {
+static sock_right_t right_of(const sock_clients_t *self, const sock_client_t *client) {
     const uint32_t place = (uint32_t)(client - self->client) - sock_parts[SOCK_STOP].first;
     return (place < SOCK_STOP_SLOTS) ? SOCK_DRIVE : SOCK_WATCH;
 }
@@ -48,19 +48,19 @@ static bool admit(sock_clients_t *self, sock_client_t *client, const newcomer_t 
 }
 
 void sock_service_refuse_crowd(const sock_clients_t *self, const sock_client_t *client, iwn_refusal_t *out_refusal) {
-    const sock_right_t door = door_of(self, client);
+    const sock_right_t right = right_of(self, client);
     out_refusal->error = IWN_TOO_MANY_CLIENTS;
     (void)snprintf(out_refusal->message, sizeof out_refusal->message,
                    "%u %s are connected and there is no place for more, except to stop; close one, or raise %s and the "
                    "limit of open files",
-                   (unsigned)self->count[door], (door == SOCK_DRIVE) ? "clients" : "watchers",
-                   (door == SOCK_DRIVE) ? "max_clients" : "max_watchers");
+                   (unsigned)self->count[right], (right == SOCK_DRIVE) ? "clients" : "watchers",
+                   (right == SOCK_DRIVE) ? "max_clients" : "max_watchers");
 }
 
 /// Closes a connection whose time has expired without a stop.
 static void turn_away(sock_clients_t *self, sock_client_t *client) {
     const iwn_id_t nobody = {.kind = IWN_ID_NONE};
-    sock_listener_t *listener = &self->listener[door_of(self, client)];
+    sock_listener_t *listener = &self->listener[right_of(self, client)];
     iwn_refusal_t refusal;
     sock_service_refuse_crowd(self, client, &refusal);
     sock_clients_refuse(self, client, &nobody, &refusal);
@@ -93,7 +93,7 @@ static sock_client_t *older(sock_client_t *known, sock_client_t *other) {
     return (known == NULL || other->close_us < known->close_us) ? other : known;
 }
 
-static void look_at_taken(places_t *seen, sock_client_t *place, uid_t uid) {
+static void find_oldest(places_t *seen, sock_client_t *place, uid_t uid) {
     const bool own = place->uid == uid;
     seen->held += own ? 1U : 0U;
     if (!place->said && !sock_client_is_closing(place)) {
@@ -104,13 +104,13 @@ static void look_at_taken(places_t *seen, sock_client_t *place, uid_t uid) {
     }
 }
 
-static places_t look_over(sock_client_t *first, uid_t uid) {
+static places_t survey(sock_client_t *first, uid_t uid) {
     places_t seen = {.held = 0};
     for (sock_client_t *place = first; place < &first[SOCK_STOP_PLACES]; place++) {
         if (place->id == IW_CLIENT_NONE) {
             seen.free_one = place;
         } else {
-            look_at_taken(&seen, place, uid);
+            find_oldest(&seen, place, uid);
         }
     }
     return seen;
@@ -119,25 +119,25 @@ static places_t look_over(sock_client_t *first, uid_t uid) {
 /// Returns a place for this user: a free one, or the one that has sent nothing for longest, if that is long enough. A
 /// user who has a full share replaces one of its own. Returns NULL if there is none.
 static sock_client_t *stop_place(sock_clients_t *self, sock_client_t *first, uid_t uid) {
-    const places_t seen = look_over(first, uid);
+    const places_t seen = survey(first, uid);
     const bool has_share = uid != 0U && seen.held >= SOCK_STOP_PLACES / 2U;
     if (seen.free_one != NULL && !has_share) {
         return seen.free_one;
     }
-    sock_client_t *room = has_share ? seen.own : seen.oldest;
-    if (room == NULL || self->now_us + SOCK_STOP_US < room->close_us + SOCK_STOP_LEAST_US) {
+    sock_client_t *place = has_share ? seen.own : seen.oldest;
+    if (place == NULL || self->now_us + SOCK_STOP_US < place->close_us + SOCK_STOP_LEAST_US) {
         return NULL;
     }
-    turn_away(self, room);
-    sock_client_flush(room);
-    sock_service_release(self, room);
-    return room;
+    turn_away(self, place);
+    sock_client_flush(place);
+    sock_service_release(self, place);
+    return place;
 }
 
 /// All places of the socket are taken. Reads the first line of the connection immediately, and waits for it if a place
 /// to wait in is free.
-static void hear_stop(sock_clients_t *self, const newcomer_t *newcomer, sock_right_t door, bool may_wait) {
-    sock_client_t *first = &self->client[sock_parts[SOCK_STOP].first + door * SOCK_STOP_SLOTS];
+static void receive_stop(sock_clients_t *self, const newcomer_t *newcomer, sock_right_t right, bool may_wait) {
+    sock_client_t *first = &self->client[sock_parts[SOCK_STOP].first + right * SOCK_STOP_SLOTS];
     sock_client_t *place = may_wait ? stop_place(self, first, newcomer->peer.uid) : NULL;
     sock_client_t *client = (place != NULL) ? place : &first[SOCK_STOP_PLACES];
     if (!admit(self, client, newcomer, SOCK_STOP)) {
@@ -187,7 +187,7 @@ static bool accept_one(sock_clients_t *self, sock_listener_t *listener) {
         listener->full_told = false;
         (void)admit(self, client, &newcomer, listener->config.right);
     } else {
-        hear_stop(self, &newcomer, listener->config.right, result == SOCK_ACCEPT_ONE);
+        receive_stop(self, &newcomer, listener->config.right, result == SOCK_ACCEPT_ONE);
     }
     return true;
 }

@@ -19,31 +19,31 @@ static const char *option_of(const sock_listener_t *self) {
     return (self->config.right == SOCK_DRIVE) ? "--socket" : "--watch-socket";
 }
 
-/// Reports an error. `cure` is the fix up to the name of the option, which the function appends.
-static int complain(const sock_listener_t *self, FILE *err, const char *what, const char *cure) {
-    (void)fprintf(err, "%s: socket %s: %s; %s %s\n", self->config.program, self->config.path, what, cure,
+/// Reports an error. `fix` is the fix up to the name of the option, which the function appends.
+static int complain(const sock_listener_t *self, FILE *err, const char *what, const char *fix) {
+    (void)fprintf(err, "%s: socket %s: %s; %s %s\n", self->config.program, self->config.path, what, fix,
                   option_of(self));
     return EX_UNAVAILABLE;
 }
 
 static int complain_errno(const sock_listener_t *self, FILE *err, int error) {
     const bool may_not = error == EACCES || error == EPERM;
-    char cure[128];
+    char fix[128];
     if (may_not) {
-        (void)snprintf(cure, sizeof cure, "run as a user who may write to its directory, or choose another with");
+        (void)snprintf(fix, sizeof fix, "run as a user who may write to its directory, or choose another with");
     } else {
-        (void)snprintf(cure, sizeof cure, "%scorrect [northbound] %s in the configuration, or",
+        (void)snprintf(fix, sizeof fix, "%scorrect [northbound] %s in the configuration, or",
                        (error == ENOENT) ? "make its directory, or " : "",
                        (self->config.right == SOCK_DRIVE) ? "socket" : "watch_socket");
     }
-    (void)complain(self, err, strerror(error), cure);
+    (void)complain(self, err, strerror(error), fix);
     return may_not ? EX_NOPERM : EX_UNAVAILABLE;
 }
 
 static int complain_folder(const sock_listener_t *self, FILE *err, int error) {
-    char cure[128];
-    (void)snprintf(cure, sizeof cure, "%s, or choose another with", sock_folder_cure(error));
-    (void)complain(self, err, sock_folder_fault(error), cure);
+    char fix[128];
+    (void)snprintf(fix, sizeof fix, "%s, or choose another with", sock_folder_fix(error));
+    (void)complain(self, err, sock_folder_fault(error), fix);
     return (error == EACCES || error == EPERM || error >= SOCK_FOLDER_FOREIGN) ? EX_NOPERM : EX_UNAVAILABLE;
 }
 

@@ -113,7 +113,7 @@ const char *sock_folder_fault(int error) {
     }
 }
 
-const char *sock_folder_cure(int error) {
+const char *sock_folder_fix(int error) {
     switch (error) {
     case SOCK_FOLDER_FOREIGN:
     case EACCES:

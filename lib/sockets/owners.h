@@ -57,6 +57,6 @@ void sock_folder_of(const char *path, char *out_folder, size_t size);
 
 /// Returns what is wrong and its fix, for an errno or one of the reasons.
 const char *sock_folder_fault(int error);
-const char *sock_folder_cure(int error);
+const char *sock_folder_fix(int error);
 
 #endif

@@ -9,12 +9,12 @@
 #include <sys/socket.h>
 
 void sock_client_read(sock_client_t *self) {
-    const size_t room = sizeof self->in - self->in_length;
-    if (room == 0U || self->phase == SOCK_ENDED || sock_client_is_closing(self)) {
+    const size_t space = sizeof self->in - self->in_length;
+    if (space == 0U || self->phase == SOCK_ENDED || sock_client_is_closing(self)) {
         return;
     }
-    const ssize_t count = recv(self->fd, &self->in[self->in_length], room, MSG_DONTWAIT);
-    self->drained = count < (ssize_t)room;
+    const ssize_t count = recv(self->fd, &self->in[self->in_length], space, MSG_DONTWAIT);
+    self->drained = count < (ssize_t)space;
     if (count > 0) {
         self->in_length += (size_t)count;
     } else if (count == 0 && self->phase == SOCK_OPEN) {
@@ -88,7 +88,7 @@ void sock_client_reply(sock_client_t *self, const char *line, size_t length) {
     }
 }
 
-static bool tell_lost(sock_client_t *self) {
+static bool report_lost(sock_client_t *self) {
     char line[64];
     iwn_out_t json;
     iwn_out_init(&json, line, sizeof line);
@@ -103,7 +103,7 @@ void sock_client_event(sock_client_t *self, const char *line, size_t length) {
     if (self->phase != SOCK_OPEN) {
         return;
     }
-    if (self->lost > 0U && tell_lost(self)) {
+    if (self->lost > 0U && report_lost(self)) {
         self->lost = 0;
     }
     if (self->lost > 0U || !queue(self, line, length, SOCK_REPLY_MAX)) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "sock_clients.h"
 
-#include "iwheel_northbound/tell.h"
+#include "iwheel_northbound/contents.h"
 
 sock_client_t *sock_clients_find(sock_clients_t *self, iw_client_t id) {
     for (uint32_t i = sock_clients_from(self, 0U); i < SOCK_CLIENTS_MAX; i = sock_clients_from(self, i + 1U)) {
@@ -27,5 +27,5 @@ void sock_clients_note_stop(sock_clients_t *self, const sock_client_t *by) {
 
 void sock_clients_refuse(sock_clients_t *self, sock_client_t *client, const iwn_id_t *id,
                          const iwn_refusal_t *refusal) {
-    sock_client_reply(client, self->line, iwn_tell_refusal(self->line, sizeof self->line, id, refusal));
+    sock_client_reply(client, self->line, iwn_write_refusal(self->line, sizeof self->line, id, refusal));
 }

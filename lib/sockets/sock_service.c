@@ -22,16 +22,16 @@ static bool may_stop(const char *line, size_t length) {
 }
 
 /// Executes the stop requests among the lines that were received but not read.
-static void hear_out(sock_clients_t *self, sock_client_t *client) {
+static void read_last_lines(sock_clients_t *self, sock_client_t *client) {
     const char *line = client->in;
     size_t left = client->in_length;
-    unsigned heard = 0;
+    unsigned lines = 0;
     const char *end;
-    while (heard < SOCK_LAST_LINES && (end = (const char *)memchr(line, '\n', left)) != NULL) {
+    while (lines < SOCK_LAST_LINES && (end = (const char *)memchr(line, '\n', left)) != NULL) {
         const size_t length = (size_t)(end - line);
         if (may_stop(line, length)) {
             self->handler.carry_out(self->handler.context, client, line, length);
-            heard++;
+            lines++;
         }
         left -= length + 1U;
         line = end + 1;
@@ -45,7 +45,7 @@ void sock_service_finish(sock_clients_t *self, sock_client_t *client) {
     if (client->right == SOCK_STOP) {
         client->close_us = until_us;
     }
-    hear_out(self, client);
+    read_last_lines(self, client);
     self->handler.leave(self->handler.context, client);
 }
 

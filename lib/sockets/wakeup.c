@@ -22,8 +22,8 @@
 #endif
 
 /// Not the function of the C library, which has one only since 2.35, and with 32 bits of time on some machines.
-static int wait_with_deadline(int fd, struct epoll_event *events, int room, const struct __kernel_timespec *span) {
-    return (int)syscall(WAIT_WITH_DEADLINE, fd, events, room, span, NULL, (size_t)0);
+static int wait_with_deadline(int fd, struct epoll_event *events, int capacity, const struct __kernel_timespec *span) {
+    return (int)syscall(WAIT_WITH_DEADLINE, fd, events, capacity, span, NULL, (size_t)0);
 }
 
 /// Returns true if the system call is missing: an old kernel returns ENOSYS, a filter that does not know the number
@@ -48,16 +48,16 @@ void sock_wakeup_close(sock_wakeup_t *self) {
     (void)close(self->fd);
 }
 
-static int wait_by_two_calls(int fd, struct epoll_event *events, int room, const struct __kernel_timespec *span) {
+static int wait_by_two_calls(int fd, struct epoll_event *events, int capacity, const struct __kernel_timespec *span) {
     struct pollfd watched = {.fd = fd, .events = POLLIN};
     struct timespec same = {0};
     if (span != NULL) {
         same = (struct timespec){.tv_sec = (time_t)span->tv_sec, .tv_nsec = (long)span->tv_nsec};
     }
-    return (ppoll(&watched, 1U, (span != NULL) ? &same : NULL, NULL) < 0) ? -1 : epoll_wait(fd, events, room, 0);
+    return (ppoll(&watched, 1U, (span != NULL) ? &same : NULL, NULL) < 0) ? -1 : epoll_wait(fd, events, capacity, 0);
 }
 
-int sock_wakeup_wait(const sock_wakeup_t *self, struct epoll_event *events, int room, iw_time_us_t now_us,
+int sock_wakeup_wait(const sock_wakeup_t *self, struct epoll_event *events, int capacity, iw_time_us_t now_us,
                      iw_time_us_t until_us) {
     const bool known = now_us != 0U || until_us == 0U || until_us == IW_NEVER;
     const iw_time_us_t from_us = known ? now_us : iwl_clock_now_us();
@@ -65,5 +65,5 @@ int sock_wakeup_wait(const sock_wakeup_t *self, struct epoll_event *events, int 
     const struct __kernel_timespec span = {.tv_sec = (int64_t)(span_us / US_PER_S),
                                            .tv_nsec = (int64_t)(span_us % US_PER_S) * NS_PER_US};
     const struct __kernel_timespec *limit = (until_us == IW_NEVER) ? NULL : &span;
-    return (self->two_calls ? wait_by_two_calls : wait_with_deadline)(self->fd, events, room, limit);
+    return (self->two_calls ? wait_by_two_calls : wait_with_deadline)(self->fd, events, capacity, limit);
 }

@@ -21,7 +21,7 @@ void sock_wakeup_close(sock_wakeup_t *self);
 /// Waits like epoll_wait until this time of CLOCK_MONOTONIC, and never returns earlier without an event. IW_NEVER waits
 /// without limit; a time in the past only polls. `now_us`: the time that the caller read last; the wait may end later
 /// by the age of that reading. With 0 the function reads the time, so that the wait ends in time.
-int sock_wakeup_wait(const sock_wakeup_t *self, struct epoll_event *events, int room, iw_time_us_t now_us,
+int sock_wakeup_wait(const sock_wakeup_t *self, struct epoll_event *events, int capacity, iw_time_us_t now_us,
                      iw_time_us_t until_us);
 
 #endif

@@ -95,7 +95,13 @@ test(idle mutation check+full faults default "" 60 test/mutation/run --build ${B
 test(idle mutation.around check+full faults default "" 120 test/mutation/around --build ${B} --jobs ${JOBS})
 test(real verdicts check faults "" "" 22 python3 test/support/test_verdict.py)
 test(real verdicts.pytest check faults "" py:pytest 60 ${PY} test/support/test_pytest_verdict.py)
-test(real system check+full realtime default py:pytest 131 ${PYTEST} test/system --build ${B} --jobs 4)
+# In virtual time; natively those that only real time shows, and 20 others selected by the hash of the commit. `realtime` runs the remaining ones natively.
+test(idle system check+full scenario "default;kernel.build" py:pytest 90 ${PYTEST} test/system --build ${B} --virtual --jobs ${JOBS})
+test(real system.realtime check+full realtime default py:pytest 45 ${PYTEST} test/system --build ${B} --jobs 4 --sample 20)
+foreach(seed 1 2 3)
+    test(idle delays.${seed} ci+full scenario "default;kernel.build" py:pytest 90 ${PYTEST} test/system --build ${B} --virtual --jobs ${JOBS} --delays ${seed})
+endforeach()
+test(real realtime ci+full realtime default py:pytest 90 ${PYTEST} test/system --build ${B} --jobs 4 --sample=-20)
 test(idle ros2.hours check+full safety default ${B}/app/bridge/ros2/iwheel-ros2 10 ${B}/test/ros2/ros2_hours ${ros2_hours})
 test(real ros2 check+full realtime default "${B}/app/bridge/ros2/iwheel-ros2 py:cyclonedds py:rosbags py:pytest" 46 ${PYTEST} test/ros2 --build ${B} --jobs 4 --ignore test/ros2/test_typed.py)
 # Programs by other authors. Without ROS 2 Jazzy, which ./check installs, these scenarios are skipped.

@@ -87,7 +87,7 @@ def snapshot(state="listening", **more):
 
 
 class FakeGateway:
-    """Listens on `path`; every request is kept in `requests` as (time, object). Override `reply` to misbehave."""
+    """Listens on `path`; stores every request in `requests` as (time, object). Override `reply` to misbehave."""
 
     def __init__(self):
         self.folder = tempfile.TemporaryDirectory(prefix="iwheel-ctl-")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The black box, and record, why, replay and learn beside it, on the simulator's bus with a real gateway."""
+"""The black box, and the commands record, why, replay and learn, on the simulator's bus with a real gateway."""
 
 import base64
 import glob
@@ -80,7 +80,7 @@ class WithRig(unittest.TestCase):
         time.sleep(0.3)
         stream.stop()
         stem = self.wait_whole(1)
-        # The writer tells the gateway only after that.
+        # The writer reports to the gateway only after that.
         end = time.monotonic() + 5
         while f"is recorded in {stem}.log" not in self.rig.gateway.text() and time.monotonic() < end:
             time.sleep(0.02)
@@ -108,7 +108,7 @@ class BlackBox(WithRig):
     def test_arm_refused_by_contradicted_assumption_is_replayed(self):
         self.assertTrue(self.client.request("confirm", item="mount_sign_left", value="yes")["ok"])
         self.assertEqual("denied", self.client.request("arm", name="tester")["error"])
-        time.sleep(1.2)  # Told again, for a recording that begins in the middle.
+        time.sleep(1.2)  # Written again, for a recording that begins in the middle.
         self.assertTrue(self.client.request("confirm", item="mount_sign_left")["ok"])
         stem = self.stop_by_button()
         code, out, err = self.ctl("replay", stem + ".log")
@@ -127,8 +127,8 @@ class BlackBox(WithRig):
         self.assertEqual((40, 40), (len(before), len(after)))
         self.assertLessEqual(before[-1]["t_us"], why["at_us"])
         self.assertGreaterEqual(after[0]["t_us"], why["at_us"])
-        told = [frame["data"][2:6] for frame in before + after if frame["id"] == 266]
-        self.assertEqual(("012C", "0000"), (told[0], told[-1]))
+        speeds = [frame["data"][2:6] for frame in before + after if frame["id"] == 266]
+        self.assertEqual(("012C", "0000"), (speeds[0], speeds[-1]))
         code, out, _ = self.ctl("why", "--frames", "40")
         self.assertEqual(0, code)
         self.assertIn(stem + ".log", out)
@@ -212,7 +212,7 @@ class BlackBox(WithRig):
 
 
 class OverTheSocket(WithRig):
-    """The same as from the files, for whoever has only the socket."""
+    """A client that has only the socket reads the same as from the files."""
 
     def away(self, *words):
         """As from another machine: in a name space in which there is another folder in its place."""
@@ -225,7 +225,7 @@ class OverTheSocket(WithRig):
         super().setUp()
         probe = ["unshare", "--user", "--map-root-user", "--mount", "sh", "-c", f'mount -t tmpfs none "{self.rig.path("")}"']
         if subprocess.run(probe, capture_output=True, check=False).returncode != 0:
-            self.skipTest("this machine gives no mount name spaces")
+            self.skipTest("this machine has no mount name spaces")
 
     def test_why_and_replay_say_the_same_as_from_the_files(self):
         stem = self.stop_by_button()
@@ -389,8 +389,8 @@ class Pieces(WithRig):
         read_us = self.ran_us(pid) - read_us - idle_us * (time.monotonic() - begin)
         self.assertTrue(self.client.request("status")["ok"])
         stream.stop()
-        # What others on this machine take of the processor is not the gateway's: its own time for a piece is.
-        print(f"pieces read {got}; the loop took {read_us / sum(got):.0f} us for each", file=sys.stderr)
+        # Only the gateway's own processor time for a piece counts, not that of other programs on this machine.
+        print(f"pieces read {got}; the loop needed {read_us / sum(got):.0f} us for each", file=sys.stderr)
         self.assertGreater(min(got), 20)
         self.assertLess(read_us / sum(got), 1000)
 
@@ -475,7 +475,7 @@ class Record(WithRig):
 class Learn(WithRig):
     config = {"wheels": {"setpoint_type": 9, "current_role": "setpoint", "setpoint_dlc": 8, "rpm_of": "rotor", "gear_ratio": "4"}, "left": {"force_unit": "dN"}}
 
-    def test_strange_wheels_are_learnt_from_a_recording(self):
+    def test_learn_recording_of_strange_wheels_has_their_values(self):
         for command in ("type 9", "role setpoint", "unit left dN", "gear left 4", "gear right 4", "rpm left rotor", "rpm right rotor", "pose reversed"):
             self.rig.sim.ask(command)
         path = self.rig.path("other.log")

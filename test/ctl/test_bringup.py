@@ -39,14 +39,14 @@ class Bringup(unittest.TestCase):
         time.sleep(0.5)
 
     def nothing_left_behind(self):
-        """Whatever way out a test took; a gateway that was left alone holds its zeros first."""
+        """Ends the programs after any exit of a test; a gateway without a client holds its zeros first."""
         try:
             self.nothing_left_soon(self.PATIENCE_S if self.killed else 0)
         finally:
             shutil.rmtree(self.runtime)
 
     killed = False
-    PATIENCE_S = 16  # Zeros are held for ten seconds beside a wheel that turns.
+    PATIENCE_S = 16  # Zeros are held for ten seconds while a wheel turns.
 
     def nothing_left_soon(self, seconds=PATIENCE_S):
         end = time.monotonic() + seconds
@@ -121,15 +121,15 @@ class Bringup(unittest.TestCase):
         operator.expect("the unit is")
         self.rig.sim.ask(f"load {side} 0")
 
-    def turn_by_hand(self, operator, radius_mm, turns=(3, 3), take="y"):
+    def turn_by_hand(self, operator, radius_mm, turns=(3, 3), answer="y"):
         operator.answer("Turn the wheels by hand?", "y")
         for side, turn in zip(("left", "right"), turns, strict=True):
             operator.expect("press Enter ...")
             self.rig.sim.ask(f"push {side} {turn * radius_mm * FULL_TURN_M_PER_MM:.3f}")
             self.wait_until_stands()
             operator.type("\n")
-        if take:
-            operator.answer("Use that?", take)
+        if answer:
+            operator.answer("Use that?", answer)
 
     def turn_around(self, operator, *commands, turns=3):
         """The machine as a whole; by other commands, if it does not go as it should."""
@@ -154,13 +154,13 @@ class Bringup(unittest.TestCase):
         """Writes the file and ends. How each key was found, by the file: {key: "confirmed: ..." or "noted: ..."}."""
         operator.answer("Write it to", "")
         self.assertEqual(0, operator.wait(), operator.text[-2000:])
-        told, found = None, {}
+        expected, found = None, {}
         with open(self.out, encoding="utf-8") as file:
             for line in file:
                 if line.startswith("; BRINGUP "):
-                    told = line.split(", ", 1)[1].strip()
+                    expected = line.split(", ", 1)[1].strip()
                 elif "=" in line and not line.startswith(";"):
-                    found[line.split(" = ")[0]], told = told, None
+                    found[line.split(" = ")[0]], expected = expected, None
         return found
 
     def push(self, operator, distance_m, mirrored):
@@ -253,7 +253,7 @@ class Bringup(unittest.TestCase):
         self.ledger_knows_it()
 
     def gateway_takes_it(self):
-        """The real gateway starts with the file, and its wheels go where they are told."""
+        """The real gateway starts with the file, and its wheels follow the commands."""
         done = subprocess.run(
             [find_program(BUILD, "iwheel-gateway"), "-c", self.out, "--socket", self.rig.path("gateway.sock"), "--check"],
             capture_output=True,
@@ -514,21 +514,21 @@ class Bringup(unittest.TestCase):
     def test_gear_from_wrong_or_missing_turns_is_not_concluded(self):
         operator = self.begin(gear=True)
         operator.answer("Turn the wheels by hand?", "y")
-        for pushes, told in ((("push right 3.6",), "RIGHT"), ((), "are no gear"), (("push left 3.6", "push left -1.8", "push left 1.8"), "back and forth")):
+        for pushes, expected in ((("push right 3.6",), "RIGHT"), ((), "are no gear"), (("push left 3.6", "push left -1.8", "push left 1.8"), "back and forth")):
             operator.expect("press Enter ...")
             for push in pushes:
                 self.rig.sim.ask(push)
                 self.wait_until_stands()
             operator.type("\n")
-            operator.expect("The right wheel counted" if told == "RIGHT" else told)
-            operator.answer("Try again?", "y" if told != "back and forth" else "n")
+            operator.expect("The right wheel counted" if expected == "RIGHT" else expected)
+            operator.answer("Try again?", "y" if expected != "back and forth" else "n")
         operator.expect("The gear is unchanged")
         operator.answer("types to try", "q")
         self.assertEqual(1, operator.wait())
 
     def test_gear_that_differs_from_wheel_to_wheel_is_none(self):
         operator = self.begin(gear=True)
-        self.turn_by_hand(operator, 192, turns=(3, 4), take=None)
+        self.turn_by_hand(operator, 192, turns=(3, 4), answer=None)
         operator.expect("The gear is unchanged")
         operator.answer("types to try", "q")
         self.assertEqual(1, operator.wait())
@@ -663,7 +663,7 @@ class Bringup(unittest.TestCase):
         operator.expect("if the gear is as configured: it was not measured")
         operator.answer("Use the mean?", "y")
         self.turn_around(operator)
-        operator.answer("Use that?", "y")  # By the distance: whatever the gear is, a tick is so long.
+        operator.answer("Use that?", "y")  # The distance per tick follows from the distance, for any gear.
         found = self.write(operator)
         self.assertRegex(found["radius_mm"], r"^noted: 3\.00 m pushed: .* ticks; the gear is assumed$")
         self.assertRegex(found["track_mm"], r"^confirmed: 3 full turns by hand: left -?\d+, right -?\d+ ticks$")
@@ -694,7 +694,7 @@ class Bringup(unittest.TestCase):
         operator = self.begin()
         self.drive_through(operator)
         operator.answer("Distance in m", "")
-        for turns, commands, told in (
+        for turns, commands, expected in (
             (3, ("push both 2",), "rolled in the same direction"),
             (3, ("turn 0.5",), "Too few ticks"),
             (3, ("turn 1", "turn -0.5", "turn 1"), "back and forth"),
@@ -702,7 +702,7 @@ class Bringup(unittest.TestCase):
             (20, ("turn 1",), "no track between 200"),
         ):
             self.turn_around(operator, *commands, turns=turns)
-            operator.expect(told)
+            operator.expect(expected)
         operator.answer("How many full turns", "2.5")
         operator.expect("a number of full turns")
         self.turn_around(operator, "turn 3", turns=2)  # Counted wrongly.
@@ -804,7 +804,7 @@ class Bringup(unittest.TestCase):
         with open(f"/proc/{children(operator.process.pid)['iwheel-gateway']}/cmdline", "rb") as file:
             folder = os.path.dirname(file.read().split(b"\0")[2].decode())
         self.assertRegex(folder, "^/tmp/iwheel-bringup-")
-        self.rig.sim.ask("estop press")  # A stop, of which the gateway keeps a recording.
+        self.rig.sim.ask("estop press")  # A stop, which the gateway records.
         operator.expect("Release it")
         self.rig.sim.ask("estop release")
         operator.answer("Turn the wheels by hand?", "q")

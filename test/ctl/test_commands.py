@@ -46,16 +46,16 @@ def listed(verb):
 
 
 class Grammar(unittest.TestCase):
-    # Every option of every verb that takes a time: the words before it, the range.
+    # Every option of every verb that has a time as its value: the words before it, the range.
     DURATIONS = ((("drive", "1", "2", "--for"), "20ms to 10min"), (("record", "-", "--for"), "1ms to 720h"), (("doctor", "--listen"), "200ms to 1min"))
 
     def test_every_duration_is_written_alike_and_refused_alike(self):
         for words, bounds in self.DURATIONS:
-            for wrong, cure in (("2", "2s"), ("0.5", "0.5s"), ("1m", "1min"), ("soon", ""), ("-1s", ""), ("1.s", ""), ("1.2345s", ""), ("999999999", "")):
+            for wrong, fix in (("2", "2s"), ("0.5", "0.5s"), ("1m", "1min"), ("soon", ""), ("-1s", ""), ("1.s", ""), ("1.2345s", ""), ("999999999", "")):
                 code, out, err = run("--socket", "/nonexistent", *words, wrong)
-                told = f"; write: {words[-1]} {cure}" if cure else ""
+                hint = f"; write: {words[-1]} {fix}" if fix else ""
                 self.assertEqual(
-                    (64, "", f'iwheelctl: {words[-1]} needs a time with its unit, such as 500ms, 1.5s, 2min or 1h, not "{wrong}"{told}\n'),
+                    (64, "", f'iwheelctl: {words[-1]} needs a time with its unit, such as 500ms, 1.5s, 2min or 1h, not "{wrong}"{hint}\n'),
                     (code, out, err),
                     words,
                 )
@@ -78,8 +78,8 @@ class Grammar(unittest.TestCase):
 
     def test_no_option_of_a_verb_takes_a_time_otherwise(self):
         """A new one belongs into the table above."""
-        taking = {(verb, option) for verb in verbs() for option in re.findall(r"^(--[a-z-]+) TIME", run("help", verb)[1], re.MULTILINE)}
-        self.assertEqual({(words[0], words[-1]) for words, _ in self.DURATIONS}, taking)
+        with_time = {(verb, option) for verb in verbs() for option in re.findall(r"^(--[a-z-]+) TIME", run("help", verb)[1], re.MULTILINE)}
+        self.assertEqual({(words[0], words[-1]) for words, _ in self.DURATIONS}, with_time)
 
     def test_verb_misspelt_gets_a_suggestion_and_unknown_the_list(self):
         for typed, meant in (("staus", "status"), ("recrod", "record"), ("dirve", "drive"), ("doc", "doctor"), ("hepl", "help")):
@@ -98,9 +98,9 @@ class Web(unittest.TestCase):
             self.assertIn("apt-get install ./iwheel-web_*.deb", err)
             fake = os.path.join(folder, "iwheel-web")
             with open(fake, "w", encoding="ascii") as file:
-                file.write('#!/bin/sh\necho "told $*"\n')
+                file.write('#!/bin/sh\necho "called $*"\n')
             os.chmod(fake, 0o755)
-            self.assertEqual((0, "told --url\n", ""), run("web", path=folder))
+            self.assertEqual((0, "called --url\n", ""), run("web", path=folder))
         self.assertEqual(64, run("web", "word")[0])
 
     def test_fleet_is_the_consoles_own_word_or_says_what_to_install(self):
@@ -110,10 +110,10 @@ class Web(unittest.TestCase):
             self.assertIn("apt-get install ./iwheel-mqtt_*.deb", err)
             fake = os.path.join(folder, "iwheel-fleet")
             with open(fake, "w", encoding="ascii") as file:
-                file.write('#!/bin/sh\necho "told $*"\n')
+                file.write('#!/bin/sh\necho "called $*"\n')
             os.chmod(fake, 0o755)
-            self.assertEqual((0, "told \n", ""), run("fleet", path=folder))
-            self.assertEqual((0, "told history w1 --last 12h --json\n", ""), run("fleet", "history", "w1", "--json", "--last", "12h", path=folder))
+            self.assertEqual((0, "called \n", ""), run("fleet", path=folder))
+            self.assertEqual((0, "called history w1 --last 12h --json\n", ""), run("fleet", "history", "w1", "--json", "--last", "12h", path=folder))
 
 
 class Json(unittest.TestCase):
@@ -138,10 +138,10 @@ class Json(unittest.TestCase):
         code, out, err = run("--json", "replay", recording)
         self.assertEqual((0, ""), (code, err))
         objects = [json.loads(line) for line in out.splitlines()]
-        told = [line for line in text.splitlines() if not line.startswith("#")]
+        lines_printed = [line for line in text.splitlines() if not line.startswith("#")]
         timed = [entry for entry in objects if "t_us" in entry]
         self.assertGreater(len(timed), 5)
-        for line, entry in zip(told, timed, strict=True):
+        for line, entry in zip(lines_printed, timed, strict=True):
             self.assertTrue(line.endswith(entry["text"]), (line, entry))
             self.assertEqual(line.split()[0], f"{entry['t_us'] // 1000000}.{entry['t_us'] % 1000000:06}")
         self.assertEqual({"summary"}, {entry["event"] for entry in objects if "t_us" not in entry} - {"note"})
@@ -212,7 +212,7 @@ class Completion(unittest.TestCase):
         return {line.split("\t")[0] for line in lines}
 
     def zsh(self, *words):
-        """Types the words and two tabs on a terminal; what then stands there."""
+        """Types the words and two tabs on a terminal; returns the text on it."""
         sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
         from operator_at_terminal import Operator
 
@@ -229,7 +229,7 @@ class Completion(unittest.TestCase):
             return self.offered(operator, set(words))
 
     def offered(self, operator, typed):
-        """What comes until a second of silence behind it, or nothing for 6 s: on a busy machine a list may take long."""
+        """Output until a second without output, or nothing for 6 s: on a busy machine a list may need long."""
         offer, end, quiet = set(), time.monotonic() + 6, time.monotonic()
         while time.monotonic() < (quiet + 1 if offer else end):
             before = len(operator.text)

@@ -51,7 +51,7 @@ class Doctor(unittest.TestCase):
         checks = {}
         for finding in whole["findings"]:
             checks.setdefault(finding["check"], []).append(finding)
-            self.assertTrue(finding["verdict"] == "ok" or finding["cure"], f"no cure: {finding}")
+            self.assertTrue(finding["verdict"] == "ok" or finding["cure"], f"no fix: {finding}")
         return done.returncode, checks, whole
 
     def verdict(self, checks, check):
@@ -153,19 +153,19 @@ class Doctor(unittest.TestCase):
         self.assertIn("pressed", checks["estop"][0]["text"])
 
     def test_bus_off_and_error_passive_are_reported_without_cable(self):
-        for beside in (False, True):
-            if beside:
+        for next_to_gateway in (False, True):
+            if next_to_gateway:
                 self.rig.start_gateway()
-            words = () if beside else self.button()
+            words = () if next_to_gateway else self.button()
             self.rig.sim.ask("busoff on")
             code, checks, _ = self.doctor(*words)
-            self.assertEqual((1, ["fail"]), (code, self.verdict(checks, "bus_state")), (beside, checks))
+            self.assertEqual((1, ["fail"]), (code, self.verdict(checks, "bus_state")), (next_to_gateway, checks))
             self.assertIn("bus-off", checks["bus_state"][0]["text"])
             self.assertNotIn("left_wheel", checks)
             self.rig.sim.ask("busoff off")
             self.assertEqual([], self.verdict(self.doctor(*words)[1], "bus_state"))
         self.rig.sim.ask("passive on")
-        time.sleep(0.1)  # Told once: the doctor, who comes later, knows it from the gateway.
+        time.sleep(0.1)  # Reported once: a later doctor reads it from the gateway.
         _, checks, _ = self.doctor()
         self.assertEqual(["warn"], self.verdict(checks, "bus_state"), checks)
         self.assertIn("error passive", checks["bus_state"][0]["text"])

@@ -105,11 +105,11 @@ class Connecting(WithGateway):
         self.assertIn("sudo usermod -aG root", done.stderr)
 
     def test_silence_after_connecting_times_out_in_two_seconds(self):
-        class Silent(FakeGateway):
+        class NoReply(FakeGateway):
             def greet(self, connection):
                 time.sleep(4)
 
-        code, _, err, seconds = self.ctl("status", gateway=self.serve(Silent))
+        code, _, err, seconds = self.ctl("status", gateway=self.serve(NoReply))
         self.assertEqual(75, code)
         self.assertIn("no answer within 2 s", err)
         self.assertTrue(1.9 < seconds < 3.5, seconds)
@@ -252,23 +252,23 @@ class Showing(WithGateway):
         doctor = ("doctor", "--no-press", "--listen", "200ms")
         for heard, bus in ((True, "can7"), (False, "can7"), (True, "unix:/nowhere")):
             gateway.heard, gateway.bus = heard, bus
-            told = {words[0]: self.ctl(*words, gateway=gateway)[1] for words in (("status",), ("why",), doctor)}
+            outputs = {words[0]: self.ctl(*words, gateway=gateway)[1] for words in (("status",), ("why",), doctor)}
             findings = json.loads(self.ctl("--json", *doctor, gateway=gateway)[1])["findings"]
             (finding,) = (finding for finding in findings if finding["check"] == "send_stalled")
             self.assertEqual("fail", finding["verdict"])
-            told["finding"] = finding["cure"]
-            for what, text in told.items():
+            outputs["finding"] = finding["cure"]
+            for what, text in outputs.items():
                 text = " ".join(text.split())
                 for command in restart:
                     self.assertEqual(heard and bus == "can7", command in text, (what, text))
                 self.assertEqual(not (heard and bus == "can7"), "check the wheels' power and the cable" in text, (what, text))
 
     def test_why_of_setpoint_acknowledged_since_names_no_fix(self):
-        class Cured(FakeGateway):
+        class Cleared(FakeGateway):
             def on_why(self, _connection, _request):
                 return {"ok": True, "number": 1, "cause": "send_stalled", "sentence": "setpoint not acknowledged", "at_us": 1}
 
-        self.assertNotIn("still", self.ctl("why", gateway=self.serve(Cured))[1])
+        self.assertNotIn("still", self.ctl("why", gateway=self.serve(Cleared))[1])
 
     def test_contradiction_shows_observation_cost_and_next_step(self):
         entry = {
@@ -430,7 +430,7 @@ class Showing(WithGateway):
         for wall_us, wanted in ((None, r"\n0\.553 s ago; it did not latch\n"), (10**15, r"\nat 2001-09-0.*, 0\.553 s ago; it did not latch\n")):
             gateway = FakeGateway()
             self.addCleanup(gateway.close)
-            gateway.on_why = lambda *_, told=wall_us: {**stop, "wall_us": told}
+            gateway.on_why = lambda *_, wall_us=wall_us: {**stop, "wall_us": wall_us}
             self.assertRegex(self.ctl("why", gateway=gateway)[1], wanted)
 
     def test_why_without_a_stop_says_so(self):
@@ -455,7 +455,7 @@ class Asking(WithGateway):
         self.assertLessEqual({request["cmd"] for _, request in self.gateway.requests}, {"status", "why", "watch"})
 
     def assert_one_request(self, wanted):
-        """Its id is the number of the attempt: on a slow machine the first connection can be given up before its line is read."""
+        """Its id is the number of the attempt: on a slow machine the first connection can time out before its line is read."""
         requests = [request for _, request in self.gateway.requests]
         self.assertEqual([wanted], [{name: value for name, value in request.items() if name != "id"} for request in requests])
         self.assertGreaterEqual(requests[0]["id"], 1)
@@ -634,7 +634,7 @@ class Driving(WithGateway):
 
     def test_drive_with_serial_commands_lost_ends_only_after_1_s(self):
         class Lossy(FakeGateway):
-            last = 10**6  # Of the commands, after which none is obeyed.
+            last = 10**6  # Number of commands; later ones are ignored.
 
             def on_drive(self, connection, request):
                 done = super().on_drive(connection, request)
@@ -942,7 +942,7 @@ class Watching(WithGateway):
         process.communicate(timeout=10)
         states = [line["number"] for line in lines if line["event"] == "state"]
         lost = sum(line["count"] for line in lines if line["event"] == "lost")
-        self.assertLess(len(states), Flood.total / 10)  # What the pipe held, and then the last one.
+        self.assertLess(len(states), Flood.total / 10)  # The contents of the pipe, and then the last one.
         self.assertEqual(states, sorted(states))
         self.assertEqual(Flood.total, len(states) + lost)
         self.assertEqual(1, sum(line["event"] == "fault" for line in lines))

@@ -14,7 +14,7 @@ from harness import find_program
 from operator_at_terminal import Operator
 
 BUILD = os.environ["IWHEEL_BUILD"]
-# What each key changes in `status`, and to what; pressed again it is as before.
+# Fields of `status` that each key changes, and the new values; a second press restores them.
 TOGGLES = {
     "e": lambda s: s["estop"] == "pressed",
     "w": lambda s: s["estop"] == "unplugged",
@@ -69,8 +69,8 @@ class Keys(unittest.TestCase):
             self.wait_for(lambda s, f=fault: not f(s), f"healthy before {key}")
             operator.type(key)
             self.wait_for(fault, key)
-            told = operator.expect("\n", 5) + operator.expect("\n", 5)
-            self.assertRegex(told, r"\[ +\d+\.\d{3} s\] [a-z]+ ", key)
+            printed = operator.expect("\n", 5) + operator.expect("\n", 5)
+            self.assertRegex(printed, r"\[ +\d+\.\d{3} s\] [a-z]+ ", key)
             operator.type("?")
             self.assertIn(f"*{key} ", operator.expect("quit"))
             operator.type(key)
@@ -91,7 +91,7 @@ class Keys(unittest.TestCase):
         self.wait_for(lambda s: s["left"]["muted"] and s["left"]["blocked"] and s["estop"] == "pressed", "three")
         operator.type("0")
         self.wait_for(lambda s: not s["left"]["muted"] and not s["left"]["blocked"] and s["estop"] == "released", "normal")
-        operator.type("m")  # On, not off: normal took the first one back.
+        operator.type("m")  # On, not off: "normal" has undone the first one.
         self.wait_for(lambda s: s["left"]["muted"], "again")
 
     def test_terminal_is_left_as_it_was_also_by_ctrl_c(self):

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Recordings against sentences: iwheelctl learn concludes nothing of which it has not seen all.
+"""Recordings and findings: iwheelctl learn concludes nothing without complete data.
 
-A generator writes recordings that have or lack, one thing at a time, what a sentence claims. Beside them stands what each
-sentence must then say, worked out from what was recorded and not from what learn does.
+A generator writes recordings that have or lack, one at a time, the data for a finding. The tests state the expected finding for
+each recording; it follows from the recorded data, not from the code of learn.
 """
 
 import itertools
@@ -22,12 +22,12 @@ CURRENTS = {"same": lambda speed: 1500, "scaled": lambda speed: 3 * speed, "nega
 
 @dataclass(frozen=True)
 class Story:
-    """A drive. Whatever is paired is (left, right)."""
+    """A drive. A pair of values is (left, right)."""
 
     phases: tuple[str, ...] = ("rest", "forward", "backward")
     phase_ms: int = 4000
     currents: tuple[str, str] = ("same", "same")
-    told: tuple[bool, bool] = (True, True)
+    commanded: tuple[bool, bool] = (True, True)
     types: tuple[int, int] = (3, 3)
     rest_type: int | None = None  # Another type with speed 0.
     second_type: int | None = None  # Every other setpoint has it.
@@ -47,7 +47,7 @@ class Story:
     raw: tuple[int | None, int | None] = (200, 20)
     sway: int = 0
     offsets: tuple[tuple[int, ...], tuple[int, ...]] = ((20,), (20,))
-    pose_step: int = 10  # mm per frame; 0: it stands. None is not possible: see poses.
+    pose_step: int = 10  # mm per frame; 0: at standstill. None is not possible: see poses.
     poses: int = 10000
     pose_little: bool = False
 
@@ -55,7 +55,7 @@ class Story:
         speed = PHASES[phase]
         if speed == 0:
             return 15 if self.runs_at_zero[side] else 0
-        if not self.turns[side] or not self.told[side] or (self.stutters and at_ms // 200 % 2):
+        if not self.turns[side] or not self.commanded[side] or (self.stutters and at_ms // 200 % 2):
             return 0
         sign = self.signs[side] * (-1 if self.flips and phase == "backward" else 1)
         return round(speed * self.rpm_per_speed) * sign
@@ -68,7 +68,7 @@ class Story:
                 for side in (0, 1):
                     rpm = self.rpm(side, at_ms - number * self.phase_ms, phase)
                     ticks[side] += abs(rpm) / 60000 * 4 * self.ticks_per_turn
-                    if self.told[side] and at_ms % self.setpoint_ms == 0:
+                    if self.commanded[side] and at_ms % self.setpoint_ms == 0:
                         yield (
                             at_ms,
                             IDS["setpoint"][side],
@@ -109,7 +109,7 @@ def learn(story, *words):
 
 
 def findings(story):
-    """What it tells by (item, side): (verdict, value). The first of several counts."""
+    """Findings by (item, side): (verdict, value). The first of several counts."""
     _, out, err = learn(story, "--json")
     if not out:
         raise AssertionError(err)
@@ -123,30 +123,30 @@ FOR, AGAINST, OPEN = "for", "against", ("unknown", None)
 
 
 class Matrix(unittest.TestCase):
-    """Every subset of {rest, forward, backward}, with every current, told to both wheels or one."""
+    """Every subset of {rest, forward, backward}, with every current, commanded to both wheels or one."""
 
     def expected_role(self, story):
-        told_all = all(phase in story.phases for phase in PHASES) and all(story.told)
-        if not told_all:
+        covered = all(phase in story.phases for phase in PHASES) and all(story.commanded)
+        if not covered:
             return OPEN
         return {("same", "same"): (FOR, "limit"), ("scaled", "scaled"): (FOR, "setpoint")}.get(story.currents, OPEN)
 
     def expected_type(self, story):
         moves = "forward" in story.phases or "backward" in story.phases
-        return (FOR, "3") if moves and all(story.told) else OPEN
+        return (FOR, "3") if moves and all(story.commanded) else OPEN
 
     def expected_sign(self, story, side):
         moves = "forward" in story.phases or "backward" in story.phases
-        return (FOR, "yes") if moves and story.told[side] else OPEN
+        return (FOR, "yes") if moves and story.commanded[side] else OPEN
 
     def test_learn_any_subset_of_inputs_concludes_only_from_them(self):
         subsets = [kinds for size in range(4) for kinds in itertools.combinations(PHASES, size)]
         count = 0
-        for phases, current, told in itertools.product(subsets, itertools.product(CURRENTS, repeat=2), ((True, True), (True, False), (False, True))):
+        for phases, current, commanded in itertools.product(subsets, itertools.product(CURRENTS, repeat=2), ((True, True), (True, False), (False, True))):
             if not phases or (current[0] != current[1] and len(phases) < 3):
                 continue
-            story = Story(phases=phases, currents=current, told=told)
-            with self.subTest(phases=phases, current=current, told=told):
+            story = Story(phases=phases, currents=current, commanded=commanded)
+            with self.subTest(phases=phases, current=current, commanded=commanded):
                 found = findings(story)
                 self.assertEqual(self.expected_role(story), found.get(("current_role", None), OPEN))
                 self.assertEqual(self.expected_type(story), found[("setpoint_type", None)])
@@ -156,7 +156,7 @@ class Matrix(unittest.TestCase):
         self.assertGreaterEqual(count, 7 * 4 * 3)
 
     def test_learn_recording_of_nothing_concludes_nothing(self):
-        for story in (Story(told=(False, False)), Story(told=(False, False), phases=("rest",))):
+        for story in (Story(commanded=(False, False)), Story(commanded=(False, False), phases=("rest",))):
             for key, (verdict, _) in findings(story).items():
                 if key[0] in ("setpoint_type", "current_role", "setpoint_dlc", "feedback_sign", "speed_scale"):
                     self.assertEqual("unknown", verdict, key)
@@ -170,10 +170,10 @@ class Matrix(unittest.TestCase):
 
 
 class Lacks(unittest.TestCase):
-    """A recording that has everything; then, one at a time, what a sentence needs is taken out."""
+    """A recording with all data; then, one at a time, the data for a finding are removed."""
 
     WHOLE = Story()
-    TOLD = {
+    FOUND = {
         ("setpoint_type", None): (FOR, "3"),
         ("current_role", None): (FOR, "limit"),
         ("setpoint_dlc", None): (FOR, "5"),
@@ -191,8 +191,8 @@ class Lacks(unittest.TestCase):
     }
 
     def differs(self, changes, **story):
-        """All is told as of the whole recording, but for the changes: keys as "item" or "item side"."""
-        expected = dict(self.TOLD)
+        """The findings are those of the whole recording, except the changes: keys as "item" or "item side"."""
+        expected = dict(self.FOUND)
         for key, verdict in changes.items():
             item, _, side = key.partition(" ")
             expected[(item, side or None)] = verdict
@@ -203,10 +203,10 @@ class Lacks(unittest.TestCase):
     def both(self, *items, verdict=OPEN):
         return {f"{item} {side}": verdict for item in items for side in SIDES}
 
-    def test_learn_whole_recording_tells_everything(self):
+    def test_learn_whole_recording_has_all_findings(self):
         found = self.differs({})
-        self.assertEqual(set(self.TOLD) | {("wheel_lag", side) for side in SIDES}, set(found), "nothing else")
-        self.assertEqual([(AGAINST, None)] * 2, [found[("wheel_lag", side)] for side in SIDES], "these wheels follow at once")
+        self.assertEqual(set(self.FOUND) | {("wheel_lag", side) for side in SIDES}, set(found), "nothing else")
+        self.assertEqual([(AGAINST, None)] * 2, [found[("wheel_lag", side)] for side in SIDES], "these wheels follow immediately")
 
     def test_learn_telemetry_of_no_wheel_leaves_wheel_items_open(self):
         self.differs(
@@ -328,37 +328,37 @@ class Lacks(unittest.TestCase):
 
 
 class AsJson(unittest.TestCase):
-    """The JSON object says what the text says."""
+    """The JSON object has the findings of the text."""
 
     def test_learn_json_has_each_sentence_and_suggestion_of_text(self):
-        for story in (Story(), Story(phases=("forward",)), Story(types=(3, 4), spare=(3,)), Story(raw=(20, 200), sent="all"), Story(told=(False, False))):
+        for story in (Story(), Story(phases=("forward",)), Story(types=(3, 4), spare=(3,)), Story(raw=(20, 200), sent="all"), Story(commanded=(False, False))):
             code, out, _ = learn(story, "--json")
             code_of_text, text, _ = learn(story)
             self.assertEqual(code_of_text, code)
             self.assertEqual(1, out.count("\n"))
-            told = json.loads(out)
+            result = json.loads(out)
             marks = {"for": "+", "against": "-", "unknown": "?"}
-            sentences = [f"  {marks[each['verdict']]} {each['text']}" for each in told["findings"]]
+            sentences = [f"  {marks[each['verdict']]} {each['text']}" for each in result["findings"]]
             self.assertEqual([line for line in text.splitlines() if line[:4] in ("  + ", "  - ", "  ? ")], sentences)
-            lines = [line for section, keys in told["suggested"].items() for line in (f"[{section}]", *(f"{key} = {value}" for key, value in keys.items()))]
+            lines = [line for section, keys in result["suggested"].items() for line in (f"[{section}]", *(f"{key} = {value}" for key, value in keys.items()))]
             self.assertEqual(lines, text.split("then: iwheelctl bringup)\n\n")[-1].splitlines() if lines else [])
 
-    def test_learn_json_counts_the_evidence(self):
-        told = json.loads(learn(Story(), "--json")[1])
-        left = told["setpoints"]["left"]
+    def test_learn_json_counts_the_observations(self):
+        result = json.loads(learn(Story(), "--json")[1])
+        left = result["setpoints"]["left"]
         self.assertEqual(
             (266, 600, {"3": 600}, [1500, 1500], [-400, 400], [5, 5], 20),
             (left["id"], left["frames"], left["types"], left["current_mA"], left["speed_mm_s"], left["length"], left["period_ms"]),
         )
         self.assertEqual((200, 200, 200), (left["at_rest"], left["forward"], left["backward"]))
-        wheel = told["wheels"]["left"]
+        wheel = result["wheels"]["left"]
         self.assertAlmostEqual(3000, wheel["told_forward"]["with_ms"], delta=50)
         self.assertEqual((0, 0), (wheel["told_forward"]["against_ms"], wheel["told_forward"]["still_ms"]))
         self.assertAlmostEqual(3000, wheel["stood_at_zero_ms"], delta=50)
         self.assertEqual([20, 20], wheel["offset_dN"])
-        self.assertEqual(([{"begin_us": 4000000, "end_us": 11980000, "deviation_mm": 0}], 0), (told["drives"], told["more_drives"]))
-        self.assertEqual([256, 288, 257, 289, 290, 512, 544, 513, 545], [each["id"] for each in told["telemetry"]])
-        self.assertEqual(None, json.loads(learn(Story(told=(False, True)), "--json")[1])["setpoints"]["left"]["current_mA"])
+        self.assertEqual(([{"begin_us": 4000000, "end_us": 11980000, "deviation_mm": 0}], 0), (result["drives"], result["more_drives"]))
+        self.assertEqual([256, 288, 257, 289, 290, 512, 544, 513, 545], [each["id"] for each in result["telemetry"]])
+        self.assertEqual(None, json.loads(learn(Story(commanded=(False, True)), "--json")[1])["setpoints"]["left"]["current_mA"])
 
     def test_learn_json_without_telemetry_is_object_and_status_1(self):
         done = subprocess.run([PROGRAM, "--json", "learn", "-"], input="(1.000000) can0 100#00000000\n", text=True, capture_output=True, check=False)

@@ -73,9 +73,9 @@ class Clock(unittest.TestCase):
                 with open(os.path.join(folder, name), "w", encoding="utf-8") as file:
                     file.write(log)
             config = os.path.join(GOLDEN, "..", "..", "share", "gateway.conf")
-            _, told, _ = run("replay", path, "--config", config)
+            _, printed, _ = run("replay", path, "--config", config)
             _, wanted, _ = run("replay", os.path.join(folder, "b.log"), "--config", config)
-            self.assertEqual(*([line.split(None, 1)[-1] for line in said.splitlines()[1:]] for said in (told, wanted)))
+            self.assertEqual(*([line.split(None, 1)[-1] for line in said.splitlines()[1:]] for said in (printed, wanted)))
 
     def test_clock_set_while_recording_invents_nothing(self):
         for name, clock in self.CLOCKS.items():
@@ -303,6 +303,23 @@ class Decode(unittest.TestCase):
         self.assertIn("shorter", rows[1]["note"])
         self.assertIn("11-bit", rows[2]["note"])
 
+    def test_decode_odd_frames_stay_in_their_columns(self):
+        text = lines("20001004#00", "12345678#0102 T", "123#R8 R", "100##1" + "AB" * 12)
+        self.assertEqual(
+            [
+                "    0.000000  4100 (0x1004)         error     1 byte: 00 (the controller's report of an error on the bus, not a frame)",
+                "    0.001000  305419896 (0x12345678) T       unknown   2 bytes: 01 02",
+                "    0.002000   291 (0x123)         unknown   remote, 8 bytes",
+                "    0.003000   256 (0x100)         ignored   CAN FD, 12 bytes:" + " AB" * 12,
+            ],
+            [row.split(" (the wheels", maxsplit=1)[0] for row in self.decode(text)[1].splitlines()[1:]],
+        )
+        self.assertEqual(["0x1004", "0x12345678", "0x123", "0x100"], [row["id_hex"] for row in self.rows(text)])
+
+    def test_decode_time_before_the_first_frame_is_negative(self):
+        out = self.decode("(2.5) can0 123#\n(2.250001) can0 123#\n(1.0) can0 123#\n")[1]
+        self.assertEqual(["0.000000", "-0.249999", "-1.500000"], [row.split()[0] for row in out.splitlines()[1:]])
+
     def test_bad_lines_are_reported_with_fix_and_lose_nothing_else(self):
         code, out, err = self.decode(lines("100#00000000") + "garbage\r\n" + lines("100#00000001").replace("\n", "\r\n") + "(1760000001.0) can0 100#0000")
         self.assertEqual(65, code)
@@ -377,7 +394,7 @@ class Decode(unittest.TestCase):
                 return usage.ru_maxrss
 
         block = lines(*["100#000F0001"] * 1000)
-        self.assertLess(resident_kB(300) - resident_kB(1), 3000)  # Of 11 MB.
+        self.assertLess(resident_kB(300) - resident_kB(1), 3000)  # The recording has 11 MB.
 
     def test_json_carries_what_the_csv_carries(self):
         text = lines(
@@ -581,7 +598,7 @@ class Why(unittest.TestCase):
 
 
 class Learn(unittest.TestCase):
-    """Drives of made-up controllers, a frame every 20 ms for each wheel, telemetry as told."""
+    """Drives of made-up controllers, a frame every 20 ms for each wheel, telemetry as specified."""
 
     def story(self, types=(3, 3), current=lambda speed: 1500, sign=(1, 1), raw=(200, 20), offset=(20, 20), gear=1.0, extra=b"", mark=""):
         text = []

@@ -33,7 +33,7 @@ class Top:
         self.stream = pyte.ByteStream(self.screen)
         self.fed = 0
 
-    def look(self, seconds=0.0):
+    def screen_after(self, seconds=0.0):
         """The rows of the screen."""
         end = time.monotonic() + seconds
         while True:
@@ -47,9 +47,9 @@ class Top:
         """The screen once the text is on it, and all that was drawn with it."""
         end = time.monotonic() + seconds
         while True:
-            rows = self.look()
+            rows = self.screen_after()
             if any(text in row for row in rows):
-                return self.look(0.2)
+                return self.screen_after(0.2)
             if time.monotonic() > end:
                 raise AssertionError(f"{text!r} is not on the screen:\n" + "\n".join(rows))
 
@@ -100,9 +100,9 @@ class WithWheels(unittest.TestCase):
         for _ in range(5):
             process = self.drive(300, -150)
             while process.poll() is None:
-                rows = top.look()
+                rows = top.screen_after()
                 if any("meas" in row and "│███" in row for row in rows) and any("300 mm/s" in row for row in rows):
-                    return top.look(0.5)
+                    return top.screen_after(0.5)
         raise AssertionError("it never drove:\n" + "\n".join(rows))
 
     def test_top_on_one_screen_shows_all_and_state_in_big_letters(self):
@@ -150,7 +150,7 @@ class WithWheels(unittest.TestCase):
         rows = top.wait_for("estop software")
         self.assertEqual(" #      ###  ##### ", top.blocks(1)[:19])  # L A T
         self.assertTrue(any("then: iwheelctl reset" in row for row in rows))
-        top.look(1.2)  # The cause must not have been seen for a second.
+        top.screen_after(1.2)  # The cause must not have been seen for a second.
         top.press("r")
         top.wait_for("reset: done")
         top.wait_for("ready: iwheelctl drive")
@@ -166,7 +166,7 @@ class WithWheels(unittest.TestCase):
         top.wait_for("LEDGER")
         for columns, rows in ((60, 24), (40, 12), (20, 4), (10, 2), (200, 60), (30, 24), (80, 10), (80, 24)):
             top.resize(columns, rows)
-            screen = top.look(0.5)
+            screen = top.screen_after(0.5)
             self.assertEqual((rows, columns), (len(screen), len(screen[0])))
             big = rows >= 20 and columns >= 55
             self.assertTrue((big and "#" in top.blocks(1)) or any("LISTENING" in row for row in screen), (columns, rows, screen))
@@ -195,13 +195,13 @@ class WithWheels(unittest.TestCase):
             self.assertFalse(cut and not any(text.endswith(row.strip()) for text in whole), row)
         self.rig.sim.ask("estop press")
         top.wait_for("LATCHED")
-        self.assertIn("release the e-stop button (or fix its wire), then: iwheelctl reset", " ".join(" ".join(top.look(0.5)).split()))
+        self.assertIn("release the e-stop button (or fix its wire), then: iwheelctl reset", " ".join(" ".join(top.screen_after(0.5)).split()))
         self.assertEqual(0, top.end())
 
     @staticmethod
     def dots(top, rows, columns):
         """How many cells of a part of the screen have dots of a plot."""
-        lines = top.look()[rows[0] : rows[1]]
+        lines = top.screen_after()[rows[0] : rows[1]]
         return sum(0x2800 < ord(c) < 0x2900 or c == "*" for line in lines for c in line[columns[0] : columns[1]])
 
     def test_large_terminals_show_speed_and_force_of_the_last_minute(self):
@@ -211,17 +211,17 @@ class WithWheels(unittest.TestCase):
             for text in ("RIGHT speed, mm/s", "LEFT force, N", "RIGHT force, N", "60 s ago", "now", "SPACE stop"):
                 self.assertTrue(any(text in row for row in rows), (text, rows))
             self.rig.sim.ask("load both 60")
-            self.see_driving(top) if not more else top.look(1)
-            top.look(1.5)
+            self.see_driving(top) if not more else top.screen_after(1)
+            top.screen_after(1.5)
             begin = next(i for i, row in enumerate(rows) if "LEFT speed" in row)
             wide = (8, 98) if size[0] == 200 else (8, 80)
-            self.assertGreater(self.dots(top, (begin, begin + 7), wide), 2, "\n".join(top.look()))
+            self.assertGreater(self.dots(top, (begin, begin + 7), wide), 2, "\n".join(top.screen_after()))
             if more:
-                self.assertTrue(all(ord(c) < 128 for row in top.look() for c in row))
+                self.assertTrue(all(ord(c) < 128 for row in top.screen_after() for c in row))
             elif size[0] == 200:
-                self.assertTrue(any("-500" in row[100:] or "-200" in row[100:] for row in top.look()), "right: backwards too")
+                self.assertTrue(any("-500" in row[100:] or "-200" in row[100:] for row in top.screen_after()), "right: backwards too")
                 force = next(i for i, row in enumerate(rows) if "LEFT force" in row)
-                self.assertTrue(any("+50 " in row or "+100 " in row for row in top.look()[force:]), top.look())
+                self.assertTrue(any("+50 " in row or "+100 " in row for row in top.screen_after()[force:]), top.screen_after())
             self.assertEqual(0, top.end())
             self.rig.sim.ask("load both 0")
             for process in self.drives:
@@ -240,14 +240,14 @@ class WithWheels(unittest.TestCase):
         top = self.top(200, 60)
         rows = top.wait_for("LEFT speed")
         begin = next(i for i, row in enumerate(rows) if "LEFT speed" in row)
-        top.look(2.0)
+        top.screen_after(2.0)
         before = self.dots(top, (begin, begin + 17), (8, 98))
         self.rig.kill_gateway(signal.SIGKILL)
         top.wait_for("waiting for its return")
-        top.look(3.0)
+        top.screen_after(3.0)
         self.rig.start_gateway()
         top.wait_for("LEFT speed")
-        line = next(row for row in top.look(1.0)[begin:] if row[8:98].strip("\u00b7 ") and "speed" not in row)[8:98]
+        line = next(row for row in top.screen_after(1.0)[begin:] if row[8:98].strip("\u00b7 ") and "speed" not in row)[8:98]
         self.assertGreater(before, 0)
         self.assertRegex(line, "[\u2801-\u28ff]\u00b7+[\u2801-\u28ff]", line)
         self.assertEqual(0, top.end())
@@ -257,7 +257,7 @@ class WithWheels(unittest.TestCase):
         top.wait_for("LEDGER")
         self.rig.kill_gateway(signal.SIGKILL)
         top.wait_for("waiting for its return")
-        rows = top.look(0.3)
+        rows = top.screen_after(0.3)
         self.assertFalse(any("mm/s" in row for row in rows), "no old speeds")
         self.assertEqual(" #   #  ###", top.blocks(1)[:11])  # N O
         self.rig.start_gateway()
@@ -278,7 +278,7 @@ class WithWheels(unittest.TestCase):
         top.wait_for("LEDGER")
         self.rig.sim.ask("mute right")
         top.wait_for("LOST")
-        rows = top.look(0.5)
+        rows = top.screen_after(0.5)
         does = next(row for row in rows if "LOST" in row)
         self.assertTrue(does.rstrip().endswith("--"), does)
         self.assertEqual(0, top.end())

@@ -184,7 +184,8 @@ static void show(const uint8_t *data, size_t size) {
     (void)history_take(&history, "iwheel/w1/event/stop", payload, size, 1000000);
     (void)history_take(&history, "iwheel/w1/event/fault", payload, size, 2000000);
     (void)fclose(out);
-    fuzz_require(history.told + history.doubled + history.garbled == 2U && strchr(text, '\033') == NULL, "each once");
+    fuzz_require(history.printed + history.doubled + history.garbled == 2U && strchr(text, '\033') == NULL,
+                 "each once");
     history_close(&history);
     free(text);
     fetch_begin(&fetch, "w1", "me", 60000000U, NOW_US);

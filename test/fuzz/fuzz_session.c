@@ -60,7 +60,7 @@ bool brd_serial_is_idle(void) {
     return true;
 }
 
-bool brd_host_keep(const brd_settings_t *settings) {
+bool brd_host_store(const brd_settings_t *settings) {
     (void)settings;
     return true;
 }
@@ -83,7 +83,7 @@ static void send_line(uint8_t channel, const char *json, size_t length) {
     const iwn_line_t line = {.json = json, .length = length, .channel = channel};
     wire_taken = 0;
     wire_length = iwn_line_write(&line, wire, IWN_LINE_BOARD_MAX);
-    while (brd_host_take(&host, rig.now_us)) {
+    while (brd_host_receive(&host, rig.now_us)) {
     }
     wire_length = wire_taken = 0;
 }
@@ -115,7 +115,7 @@ static void pass(uint32_t span_ms) {
         }
         gateway_rig_step(&rig);
         const iw_snapshot_t seen = gateway_rig_look(&rig);
-        (void)brd_host_tell(&host, &seen, false);
+        (void)brd_host_report(&host, &seen, false);
         rig.judge.violation = NULL; // The judge does not know the requests of this target.
         gateway_rig_run(&rig, 5000);
         judge(before, was_latched);

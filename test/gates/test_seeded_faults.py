@@ -512,7 +512,7 @@ CASES = [
     (eva, "frama-c", "signed overflow", "int main(void) { int a = Frama_C_interval(0, 2147483647); return a + 1; }\n", True),
     (eva, "frama-c", "an assertion that does not hold", "int main(void) { int a = Frama_C_interval(0, 1);\n//@ assert a == 0;\nreturn a; }\n", True),
     (eva_core, "frama-c", "the core: ring index off by one", "eva-ring-index-off-by-one", True),
-    (eva_core, "frama-c", "the core: a queue of three in space for two", "eva-queue-of-three-in-room-for-two", True),
+    (eva_core, "frama-c", "the core: a queue of three in space for two", "eva-queue-of-three-in-space-for-two", True),
     (eva_core, "frama-c", "the core: negation of any number", "eva-negation-of-any-number", True),
     (tidy, "clang-tidy", "clean", CLEAN, False),
     (tidy, "clang-tidy", "size of the pointer", "#include <string.h>\nvoid f(int *p);\nvoid f(int *p) { memset(p, 0, sizeof(p)); }\n", True),

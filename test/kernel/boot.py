@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Boots the kernel of build_kernel as an ordinary process, with the host's files as its root, and ends it for sure."""
+"""Boots the kernel of build_kernel as an ordinary process, with the host's files as its root, and always ends it."""
 
 import contextlib
 import json
@@ -13,7 +13,7 @@ from harness import die_with_parent
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 VIRTUAL_NICE = 5
-MEMORY_ELSEWHERE = ("TMPDIR", "TMP", "TEMP")  # There the kernel would keep its memory, on a disk perhaps; without them it is in /dev/shm.
+MEMORY_ELSEWHERE = ("TMPDIR", "TMP", "TEMP")  # Folders in which the kernel would place its memory, perhaps on a disk; without them it is in /dev/shm.
 
 
 def find_kernel(install=True):
@@ -28,7 +28,7 @@ def find_kernel(install=True):
             last = line.rstrip("\n")
             print(f"  {last}", flush=True)
     if child.returncode != 0:
-        raise RuntimeError("the kernel could not be built; test/kernel/build_kernel tells why")
+        raise RuntimeError("the kernel could not be built; its reason: test/kernel/build_kernel")
     return last
 
 
@@ -58,15 +58,15 @@ class Boot:
                 cwd=folder,
                 env={key: value for key, value in os.environ.items() if key not in MEMORY_ELSEWHERE},
             )
-        self.taken, self.cpu_s = 0, 0
+        self.read_bytes, self.cpu_s = 0, 0
 
     def prepare(self):
-        """In the child: where it may run. Virtual time makes way for everything else; real time waits for nobody, if permitted."""
+        """In the child: sets processors and priority. Virtual time has a low priority; real time has a high one, if permitted."""
         die_with_parent()
         os.sched_setaffinity(0, self.processors)
         if self.plan["virtual"]:
             os.nice(VIRTUAL_NICE)
-        if self.plan["virtual"] or self.plan["group"] == "starved":  # which would use up what is allowed, and be stopped for it
+        if self.plan["virtual"] or self.plan["group"] == "starved":  # With a real-time priority it would use up its share and be stopped.
             return
         with contextlib.suppress(PermissionError):  # then the witness decides what can be judged
             os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(1))
@@ -95,10 +95,10 @@ class Boot:
     def results(self):
         """Results that came since the last call."""
         with open(self.path("results"), encoding="utf-8") as file:
-            file.seek(self.taken)
+            file.seek(self.read_bytes)
             lines = file.read()
         whole = lines[: lines.rfind("\n") + 1]
-        self.taken += len(whole.encode())
+        self.read_bytes += len(whole.encode())
         return [json.loads(line) for line in whole.splitlines()]
 
     def running(self):
@@ -109,7 +109,7 @@ class Boot:
         return time.monotonic() - self.began
 
     def stall_as_asked(self):
-        """A test may ask for a stalled machine, by NAME.stall with the seconds in it: the kernel's process stands still so long."""
+        """A test may ask for a stalled machine, by NAME.stall with the seconds in it: the kernel's process is stopped for that time."""
         try:
             with open(self.path("stall"), encoding="ascii") as file:
                 seconds = float(file.read())
@@ -126,7 +126,7 @@ class Boot:
             os.killpg(self.child.pid, signal.SIGKILL)
 
     def end(self):
-        """Kills what is left of it; keeps the seconds of processor time that it and its processes took."""
+        """Kills its remaining processes; stores the processor time of all of them."""
         self.kill()
         _, status, usage = os.wait4(self.child.pid, 0)
         self.child.returncode = os.waitstatus_to_exitcode(status)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Boots the groups of tests, two at a time, and tells what came of each test.
+"""Boots the groups of tests, two at a time, and reports the result of each test.
 
 Virtual time does not care how busy the machine is, real time does: while something runs in real time it has a processor to itself.
 """
@@ -81,7 +81,7 @@ class Campaign:
         reason = self.why_skipped(group, plan)
         if reason:
             for name in plan["tests"]:
-                self.take(group, {"name": name, "verdict": "skipped", "figures": [reason]})
+                self.add(group, {"name": name, "verdict": "skipped", "figures": [reason]})
             return
         processor = self.take_processor(group)
         boot_type = EmulatedBoot if group.distribution else NativeBoot if self.options.native else Boot
@@ -95,7 +95,7 @@ class Campaign:
                 for result in boot.results():
                     done.add(result["name"])
                     result["host_s"], since = boot.seconds() - since, boot.seconds()
-                    self.take(group, result)
+                    self.add(group, result)
                 if not running or boot.seconds() > limit_s:
                     break
                 boot.stall_as_asked()
@@ -110,7 +110,7 @@ class Campaign:
         why = f"the boot was ended after {limit_s} s" if hung else "the kernel ended before this test did"
         for number, name in enumerate(name for name in plan["tests"] if name not in done):
             text = f"{why}\n{boot.complaint()}" if number == 0 else f"not reached: {why}"
-            self.take(group, {"name": name, "verdict": "failed", "failures": [[text, "rule", 0]]})
+            self.add(group, {"name": name, "verdict": "failed", "failures": [[text, "rule", 0]]})
 
     def take_processor(self, group):
         """The one with the fewest kernels. One, because a kernel that wanders between two takes half as long again."""
@@ -128,7 +128,7 @@ class Campaign:
         self.reserved = set()
 
     def work(self):
-        """The soak is the longest: it is started first, with what runs in real time beside it."""
+        """The soak is the longest: it is started first, with the tests in real time in parallel."""
         jobs, virtual = max(1, self.options.jobs), [group for group in GROUPS if group.virtual and not self.options.native]
         if jobs == 1 or len(self.processors) == 1:
             for group in virtual:
@@ -154,7 +154,7 @@ class Campaign:
             return f"no gateway with libgpiod {group.gpiod}: {error}"
         return None
 
-    def take(self, group, result):
+    def add(self, group, result):
         result = {"figures": [], "failures": [], "measures": {}, "latencies": [], "from_level": [], "logs": [], "seconds": 0, "host_s": 0, **result}
         result["group"] = group.name
         result["inconclusive"] = result["verdict"] == "inconclusive"
@@ -162,9 +162,9 @@ class Campaign:
             result["verdict"] = "skipped"
         with self.lock:
             self.results.append(result)
-            self.tell(result)
+            self.print_result(result)
 
-    def tell(self, result):
+    def print_result(self, result):
         mark = {"passed": "ok  ", "failed": "FAIL", "skipped": "skip"}[result["verdict"]]
         figures = f"  [{', '.join(result['figures'])}]" if result["figures"] else ""
         title = ENTRIES[result["name"]].title
@@ -196,7 +196,7 @@ class Campaign:
 
     def close(self):
         if self.options.keep or self.count("failed"):
-            print(f"logs are kept in {self.folder}")
+            print(f"logs are in {self.folder}")
         else:
             shutil.rmtree(self.folder, ignore_errors=True)
 
@@ -218,7 +218,7 @@ def parse(arguments):
     parser.add_argument("--jobs", type=int, default=2, metavar="N", help="kernels at a time (default: 2)")
     parser.add_argument("--log-lines", type=int, default=LOG_LINES, metavar="N", help="of each log of a failed test")
     parser.add_argument("--no-install", action="store_true", help="install nothing to build the kernel")
-    parser.add_argument("--keep", action="store_true", help="keep results and logs")
+    parser.add_argument("--keep", action="store_true", help="do not delete results and logs")
     parser.add_argument("--report", action="store_true", help="write docs/developer/fault-catalogue.md from this run")
     parser.add_argument("--list", action="store_true", help="list the tests and exit")
     options = parser.parse_args(arguments)
@@ -242,7 +242,7 @@ def once(options, kernel):
 
 
 def campaigns(options, kernel):
-    """All of them in a row, each told as it ends; returns their outcomes. Ctrl-C ends the row: what was whole is told."""
+    """Runs all of them in a row and prints each as it ends; returns their outcomes. Ctrl-C ends the row; complete ones are printed."""
     outcomes = []
     for number in range(options.repeat):
         now, began = copy.copy(options), time.monotonic()

@@ -17,7 +17,7 @@ CLOCKS_EVERY = 25  # fetches
 
 
 def open_raw(interface, *ids):
-    """A raw CAN socket that hears everything, or only those ids."""
+    """A raw CAN socket that receives all frames, or only those ids."""
     sock = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
     if ids:
         filters = b"".join(struct.pack("=II", can_id, 0x7FF | EXTENDED) for can_id in ids)

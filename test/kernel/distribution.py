@@ -3,7 +3,7 @@
 
 Nobody here configured that kernel, and its driver is one that boards have: bit timing over netlink, IFF_ECHO, restart-ms. Its clock
 counts instructions (2 ns each) and jumps while nobody works, so that no load on this machine makes it late. Neither bus errors nor the
-time that a frame takes are modelled, and Debian 12's kernel has no gpio-sim: the e-stop's button is the local one.
+duration of a frame are modelled, and Debian 12's kernel has no gpio-sim: the e-stop's button is the local one.
 
 Also for another architecture: then everything in that machine is Debian's for it, and the programs are those of the packages that
 test/cross/run has built.
@@ -70,7 +70,7 @@ PACKAGES = {"cpio": "cpio", "busybox": "busybox-static", "ip": "iproute2", "apt-
 PATH = "/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin"
 OWN = ("app/gateway/iwheel-gateway", "app/sim/iwheel-sim", "app/ctl/iwheelctl", "test/kernel/iwheel-sleeper")
 SETTINGS = ("/etc/passwd", "/etc/group", "/etc/nsswitch.conf", "/etc/ld.so.cache")
-# Of Python's own library: what no test needs, and most of its bytes.
+# Parts of Python's own library that no test needs, with most of its bytes.
 NOT_NEEDED = ("test", "tests", "idlelib", "lib2to3", "ensurepip", "dist-packages", "site-packages", "tkinter", "turtledemo", "pydoc_data")
 FIRST = """#!/bin/bash
 cd /modules || exit 1
@@ -131,7 +131,7 @@ def find_kernel(name):
             if machine.built:
                 build_modules(package, version, machine.built, work)
             shutil.rmtree(folder, ignore_errors=True)
-            os.rename(os.path.join(work, "kept"), folder)
+            os.rename(os.path.join(work, "stored"), folder)
     return folder
 
 
@@ -142,7 +142,7 @@ def find_foreign(machine):
     fresh = not os.path.exists(os.path.join(root, "wanted"))
     output(os.path.join(ROOT, "scripts/from_debian"), "root", machine.architecture, root, *machine.parts)
     if fresh or not os.path.exists(os.path.join(folder, "vmlinuz")):
-        keep(root, folder)
+        store(root, folder)
     return folder
 
 
@@ -161,7 +161,7 @@ def packages_of(architecture):
 
 
 def why_not_emulated(name):
-    """What keeps that machine from being had, and the cure; None if nothing does."""
+    """Reason why that machine is not available, and the fix; None if it is available."""
     machine = MACHINES[name]
     try:
         find_kernel(name)
@@ -180,13 +180,13 @@ def download(packages, work):
 
 
 def fetch(package, work):
-    """Downloads and unpacks it; what is needed lies in `work`/kept then. Nothing is installed."""
+    """Downloads and unpacks it into `work`/stored. Nothing is installed."""
     output("dpkg-deb", "-x", *download([package], work), os.path.join(work, "all"))
-    keep(os.path.join(work, "all"), os.path.join(work, "kept"))
+    store(os.path.join(work, "all"), os.path.join(work, "stored"))
 
 
 def build_modules(image, version, built, work):
-    """A driver from the source of the distribution's kernel, with its headers and its compiler, beside the modules in `work`/kept."""
+    """A driver from the source of the distribution's kernel, with its headers and its compiler, next to the modules in `work`/stored."""
     need(make="make", gcc="gcc")
     release, series = image.removeprefix("linux-image-"), ".".join(version.split(".")[:2])
     headers = [f"linux-headers-{release}", f"linux-headers-{release.rsplit('-', 1)[0]}-common", f"linux-kbuild-{series}"]
@@ -203,19 +203,19 @@ def build_modules(image, version, built, work):
     output("make", "-C", tree, f"M={os.path.join(folder, source, built[0])}", *built[1:], "modules")
     for name in os.listdir(os.path.join(folder, source, built[0])):
         if name.endswith(".ko"):
-            shutil.copy(os.path.join(folder, source, built[0], name), os.path.join(work, "kept", "modules"))
+            shutil.copy(os.path.join(folder, source, built[0], name), os.path.join(work, "stored", "modules"))
 
 
-def keep(root, kept):
+def store(root, stored):
     """Kernel and modules of that root, into that folder."""
-    os.makedirs(os.path.join(kept, "modules"), exist_ok=True)
+    os.makedirs(os.path.join(stored, "modules"), exist_ok=True)
     boot = os.path.join(root, "boot")
-    shutil.copy(os.path.join(boot, next(name for name in os.listdir(boot) if name.startswith("vmlinuz"))), os.path.join(kept, "vmlinuz"))
+    shutil.copy(os.path.join(boot, next(name for name in os.listdir(boot) if name.startswith("vmlinuz"))), os.path.join(stored, "vmlinuz"))
     for folder, _, files in os.walk(root):
         for name in files:
             module, _, ending = name.partition(".ko")
             if module in MODULES.split() and ending in ("", ".xz", ".zst"):
-                place = shutil.copy(os.path.join(folder, name), os.path.join(kept, "modules", name))
+                place = shutil.copy(os.path.join(folder, name), os.path.join(stored, "modules", name))
                 if ending:
                     output({".xz": "xz", ".zst": "zstd"}[ending], "-dq", place)
 

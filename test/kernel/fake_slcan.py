@@ -3,8 +3,8 @@
 
     gateway -- canN (slcan) -- pty -- this thread -- the simulator's bus (unix:PATH)
 
-It takes a frame from the pty only while it has room for it, as an adapter with flow control does; what it has taken stays in
-it until the simulated bus has taken it. Without a hub it is an adapter on a bus where nobody else is, but everything works.
+The adapter reads a frame from the pty only while it has space for it, as an adapter with flow control does. It stores the frame
+until the simulated bus accepts it. Without a hub the adapter is alone on its bus, but everything works.
 """
 
 import array
@@ -22,7 +22,7 @@ from netdev import command, exists, fetch, up
 TIOCSETD, SIOCGIFNAME, N_SLCAN = 0x5423, 0x8910, 17
 DEPTH = 3  # frames the adapter holds: one in its controller, two behind it
 STATES = {"active": b"sa000000\r", "warning": b"sw100096\r", "passive": b"sp128128\r", "bus_off": b"sb256256\r"}
-READ_BYTES = 64  # small, so that what was not taken yet stays in the kernel
+READ_BYTES = 64  # small, so that frames that were not read yet stay in the kernel
 
 
 def to_line(can_id, length, data):
@@ -44,7 +44,7 @@ def from_line(line):
 
 
 class FakeSlcan(threading.Thread):
-    """Plugged in at once, with the link up at 1 Mbit/s. `taken` lists the frames it took from the kernel."""
+    """Plugged in immediately, with the link up at 1 Mbit/s. `taken` lists the frames that the adapter read from the kernel."""
 
     def __init__(self, hub_path=None, queue_length=4):
         super().__init__(daemon=True)
@@ -60,7 +60,7 @@ class FakeSlcan(threading.Thread):
         self.start()
         self.link_up()
 
-    # What a person does to it -----------------------------------------------------------------------------------------
+    # Actions of a person ----------------------------------------------------------------------------------------------
 
     def plug(self):
         with self.lock:
@@ -89,12 +89,12 @@ class FakeSlcan(threading.Thread):
         self._wake()
 
     def stall(self, on):
-        """It takes nothing from the kernel any more; what it hears from the bus it still tells."""
+        """The adapter reads nothing from the kernel; it still sends the frames of the bus to the kernel."""
         self.stalled = on
         self._wake()
 
     def tell(self, state):
-        """The state of its controller, one of STATES."""
+        """Reports the state of its controller, one of STATES."""
         self.write(STATES[state])
 
     def errors(self, count, kinds=b"s"):

@@ -29,14 +29,14 @@ def last_line(command, **variables):
 
 
 def find_build(build, download=True):
-    """A build directory like `build`, beside it, whose gateway uses libgpiod 2. Made if it is not there. RuntimeError: it cannot be."""
+    """A build directory next to `build`, whose gateway uses libgpiod 2. Created if missing. RuntimeError if that fails."""
     if generation(build) == 2:
         return build
-    beside = os.path.join(os.path.dirname(os.path.abspath(build)), "gpiod2")
+    neighbour = os.path.join(os.path.dirname(os.path.abspath(build)), "gpiod2")
     library = [os.path.join(ROOT, "test", "kernel", "build_libgpiod2")] + ([] if download else ["--no-download"])
-    configure = ["cmake", "-S", ROOT, "-B", beside, "-DCMAKE_BUILD_TYPE=RelWithDebInfo", "-DCMAKE_C_FLAGS_RELWITHDEBINFO=-O2 -DNDEBUG"]
+    configure = ["cmake", "-S", ROOT, "-B", neighbour, "-DCMAKE_BUILD_TYPE=RelWithDebInfo", "-DCMAKE_C_FLAGS_RELWITHDEBINFO=-O2 -DNDEBUG"]
     last_line(configure, PKG_CONFIG_PATH=last_line(library))
-    last_line(["cmake", "--build", beside, "--target", "iwheel-gateway", "iwheel-sim", "-j", str(os.cpu_count())])
-    if generation(beside) != 2:
-        raise RuntimeError(f"{beside} was configured with libgpiod {generation(beside)}; remove it and try again")
-    return beside
+    last_line(["cmake", "--build", neighbour, "--target", "iwheel-gateway", "iwheel-sim", "-j", str(os.cpu_count())])
+    if generation(neighbour) != 2:
+        raise RuntimeError(f"{neighbour} was configured with libgpiod {generation(neighbour)}; remove it and try again")
+    return neighbour

@@ -28,7 +28,7 @@ class Group(NamedTuple):
         return (self.same_as or self.name) in groups and (full or not self.few or name.startswith(self.few))
 
 
-# What differs between the generations of libgpiod is how a line is opened, read, lost and found again.
+# The generations of libgpiod differ in how a line is opened, read, lost and found again.
 READS_THE_LINE = (
     "row11_presses_low",
     "row11_two_lines",

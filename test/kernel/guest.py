@@ -35,7 +35,7 @@ def main(path):
 
 
 def result_of(run, name, verdict, attempt, tries):
-    """One line of the results. What is inconclusive counts as skipped; `verdict` says so all the same."""
+    """One line of the results. An inconclusive test counts as skipped; `verdict` still states it."""
     data = attempt.data or {}
     figures = data.get("figures", []) + ([attempt.skip] if attempt.skip else []) + ([f"attempt {tries}, alone"] if tries > 1 else [])
     result = {"name": name, "verdict": verdict, "figures": figures, "failures": attempt.failures, "seconds": (attempt.end_us - attempt.begin_us) / 1e6}

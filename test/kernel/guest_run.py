@@ -58,7 +58,7 @@ def run_one(entry, plan):
 
 
 def save_logs(test, plan, name):
-    """The bus log and the gateway's words of a failed test, beside the results."""
+    """Stores bus log and gateway log of a failed test next to the results."""
     paths = []
     for number, rig in enumerate(test.rigs):
         base = f"{plan['results'].rsplit('.', 1)[0]}.{name}.{number}"
@@ -78,7 +78,7 @@ def died(text):
 
 
 def hasten_received_frames():
-    """Under load Linux leaves received frames, echoes too, to a thread of no priority: services would hear nothing for some ticks while tests compute."""
+    """Under load Linux leaves received frames, echoes too, to a thread of no priority: services would receive nothing for some ticks while tests compute."""
     for pid in filter(str.isdigit, os.listdir("/proc")):
         try:
             with open(f"/proc/{pid}/comm", encoding="ascii", errors="replace") as file:
@@ -89,7 +89,7 @@ def hasten_received_frames():
 
 
 def attempt_of(result):
-    """From what a worker told."""
+    """The outcome from the report of a worker."""
     known = {key: result[key] for key in ("skip", "stalls", "claims", "begin_us", "end_us") if key in result}
     return Attempt([Failure(*failure) for failure in result["failures"]], data=result, **known)
 
@@ -97,7 +97,7 @@ def attempt_of(result):
 class GuestRun(Session):
     """The runner of the scenarios, with forked workers; in virtual time no machine is late, so every verdict is conclusive.
 
-    In real time a witness runs beside, with the gateway's priority. Setting up a test always delays it a little (a fork is slow in
+    In real time a witness runs in parallel, with the gateway's priority. Setting up a test always delays it a little (a fork is slow in
     such a kernel), so what counts is a delay that is long enough, and near enough, to have caused what is wrong.
     """
 
@@ -108,11 +108,11 @@ class GuestRun(Session):
         self.folder = None
 
     def watch(self):
-        """In real time: from now on the witness runs beside, until `close`."""
+        """In real time: from now on the witness runs in parallel, until `close`."""
         sys.setswitchinterval(SWITCH_S)
         if not self.plan["native"]:  # a machine's own kernel is left as it is
             hasten_received_frames()
-        self.folder = tempfile.mkdtemp(prefix="iwheel-witness-")  # not beside the results: the host's files are slow
+        self.folder = tempfile.mkdtemp(prefix="iwheel-witness-")  # not next to the results: the host's files are slow
         file = os.path.join(self.folder, "late")
         open(file, "w", encoding="ascii").close()
         command = [os.path.join(self.plan["build"], "test", "kernel", "iwheel-sleeper"), file, str(kernel_rig.PRESS_LATE_US)]
@@ -132,12 +132,12 @@ class GuestRun(Session):
         if failure.text.startswith("pair_spread"):  # the strictest of all, and over in a moment
             around = failure.at_us - kernel_rig.TICK_US, failure.at_us + kernel_rig.TICK_US
             return explains(failure, kernel_rig.late_wakings(*around, kernel_rig.PRESS_LATE_US))
-        if failure.text.startswith("no_silence"):  # the end of a hold depends on all that was heard before
+        if failure.text.startswith("no_silence"):  # the end of a hold depends on all frames received before
             failure = failure._replace(at_us=0)
         return super().explained(attempt, failure)
 
     def take_latencies(self, result):
-        """{kind: microseconds}. The test has left out those of presses beside which the machine was late."""
+        """{kind: microseconds}. The test has left out presses during which the machine was late."""
         return {kind: [latency_us for _, latency_us in result[kind]] for kind in KINDS}
 
     def work_off(self, name):

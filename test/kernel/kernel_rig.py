@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The rigs of test/system on interfaces and GPIO lines of a real kernel, and what a scenario here is given."""
+"""The rigs of test/system on interfaces and GPIO lines of a real kernel, and the parameters of a scenario."""
 
 import contextlib
 import itertools
@@ -24,7 +24,7 @@ BEFORE_TICK_US, BEFORE_TICK_REAL_US, SPIN_US = 200, 700, 3_000  # in real time i
 RAW_ESTOP_US = 1_000_000  # the judge's own limit; what counts is the time from the edge
 ESTOP_US = 5_000  # invariant 2, 99th percentile
 MOVE_US = 2_000  # if moving the contact took longer, nobody knows when the level changed
-LEVEL_US = TICK_US + ESTOP_US  # from the level: the simulated line tells of its edge a tick later at the latest
+LEVEL_US = TICK_US + ESTOP_US  # from the level: the simulated line reports its edge a tick later at the latest
 CLOCK = {"virtual": False}  # set once, by guest.py, before the first scenario
 WITNESS = {"file": None}  # set by guest.py in real time: what iwheel-sleeper writes
 PRESS_LATE_US = 3_000  # a press is timed against 5 ms; a machine later than this could be to blame
@@ -51,7 +51,7 @@ class Press(NamedTuple):
 class GpioButton:
     """The e-stop contact on a simulated line. Mixed into a rig; `active` is the level of a pressed button.
 
-    The simulated chip changes the level at once but delivers edges at the kernel's next timer tick, up to 10 ms later. So the
+    The simulated chip changes the level immediately but delivers edges at the kernel's next timer tick, up to 10 ms later. So the
     contact is moved right before a tick, and a second line, the witness, is pulled in the same instant: the kernel's stamp of
     its edge is when the edge happened. `presses` lists all of them.
     """
@@ -96,7 +96,7 @@ class GpioButton:
         due_us = begin_us + TICK_US - (begin_us + before_us - self.tick_us) % TICK_US
         time.sleep(max(due_us - begin_us - spin_us, 0) / 1e6)
         while spin_us and now_us() < due_us:
-            pass  # a sleep ends too late in real time, and the edge would be told a whole tick after the level
+            pass  # a sleep ends too late in real time, and the edge would be reported a whole tick after the level
         return self._contact(True)
 
     def _pressed(self, moved):
@@ -155,7 +155,9 @@ def remove_marker(interface):
 class VcanRig(GpioButton, Rig):
     """Gateway, simulated wheels and recorder on one vcan interface; the e-stop is a GPIO line."""
 
-    ids = ()  # what the recorder hears; all
+    exit_clears = False
+
+    ids = ()  # ids that the recorder receives; empty: all
 
     def prepare(self):
         self.interface = f"vcan{next(NUMBERS)}"
@@ -227,10 +229,11 @@ class HighVcanRig(VcanRig):
 class SlcanRig(GpioButton, Rig):
     """Gateway on the interface of a fake slcan adapter; wheels and recorder on the simulator's bus behind it.
 
-    The recorder is at the wheels' end: it sees what really was on the bus, not what the kernel took.
+    The recorder is at the wheels' end: it records the frames on the bus, not those that the kernel accepted.
     """
 
     queue_length = 4
+    exit_clears = False
 
     def prepare(self):
         self.adapter = None
@@ -264,7 +267,7 @@ class KernelTest(Test):
         self.late_machine = 0  # presses that count for nothing, because of it
 
     def measure(self, name, value):
-        """Keeps the worst value of that name, and shows it."""
+        """Stores the worst value of that name, and shows it."""
         self.measures[name] = max(value, self.measures.get(name, value))
 
     def judge(self, rig, moves=True, **options):
@@ -297,7 +300,7 @@ class KernelTest(Test):
     def excused(since_us, latency_us, limit_us=ESTOP_US):
         """Too late, and so was the machine, before the limit was over: what came later explains nothing.
 
-        A late machine makes no stop faster: one in time counts whatever was beside it.
+        A late machine makes no stop faster: one in time counts, whatever else ran.
         """
         return latency_us > limit_us and machine_late(since_us - TICK_US, since_us + limit_us, PRESS_LATE_US)
 
@@ -329,5 +332,5 @@ class KernelTest(Test):
 
 
 def virtual():
-    """Whether time stands still while somebody works."""
+    """Whether time does not advance while a process computes."""
     return CLOCK["virtual"]

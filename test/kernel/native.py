@@ -30,17 +30,17 @@ exec "$@"
 
 
 def why_not_alone():
-    """What keeps us from a network and mounts of our own, and the cure; None if nothing does."""
+    """Reason why a private network and private mounts are not available, and the fix; None if they are."""
     tried = subprocess.run([*ALONE, "true"], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
     if tried.returncode == 0:
         return None
     # A chroot of a plain folder: mounts made in there would be made outside as well.
-    cure = " (in a chroot: mount --bind its folder onto itself before you enter it)" if "propagation" in tried.stdout else ""
-    return f"no network and mounts of our own can be had here: {tried.stdout.strip()}{cure}"
+    fix = " (in a chroot: mount --bind its folder onto itself before you enter it)" if "propagation" in tried.stdout else ""
+    return f"a private network and private mounts are not available here: {tried.stdout.strip()}{fix}"
 
 
 def why_not_native():
-    """What keeps this machine's kernel from being used, and the cure; None if nothing does."""
+    """Reason why this machine's kernel cannot be used, and the fix; None if it can."""
     if os.geteuid() != 0:
         return "--native needs root: it makes CAN interfaces and GPIO chips; run it with sudo, or without --native"
     missing = sorted({package for program, package in PROGRAMS.items() if not shutil.which(program)})

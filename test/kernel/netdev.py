@@ -21,7 +21,7 @@ def command(*words):
 
 
 def add_vcan(name):
-    """Up, with room for CAN FD, so that FD frames can be sent on it. By one call: each takes long in such a kernel."""
+    """Sets the interface up, with space for CAN FD frames. It uses one call, because each call needs long in such a kernel."""
     command("ip", "link", "add", name, "up", "mtu", "72", "type", "vcan")
 
 

@@ -46,9 +46,9 @@ class Distribution(unittest.TestCase):
             self.assertIn("E: No packages found", distribution.why_not_emulated("amd64"))
 
     def test_a_kernel_that_was_fetched_is_not_fetched_again(self):
-        kept = os.path.join(self.folder, "iwheel", "linux-image-6.1.0-1-amd64-6.1.9-1")
-        os.makedirs(kept)
-        with open(os.path.join(kept, "vmlinuz"), "w", encoding="ascii"):
+        stored = os.path.join(self.folder, "iwheel", "linux-image-6.1.0-1-amd64-6.1.9-1")
+        os.makedirs(stored)
+        with open(os.path.join(stored, "vmlinuz"), "w", encoding="ascii"):
             pass
         with answers("  Depends: linux-image-6.1.0-1-amd64\n", "  Candidate: 6.1.9-1\n"):
             self.assertIsNone(distribution.why_not_emulated("amd64"))

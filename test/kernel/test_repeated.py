@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Several campaigns in a row: what is told of them, and the page that is written of them. Needs no kernel.
+"""Several campaigns in a row: the printed lines, and the written page. Needs no kernel.
 
 Usage: test/kernel/test_repeated.py
 """
@@ -31,7 +31,7 @@ def outcome(seed, *results):
 
 class Campaigns(unittest.TestCase):
     def run_main(self, arguments, outcomes):
-        """What campaign.main prints, and its exit code, when the campaigns come out as given; None is an interrupted one."""
+        """Output and exit code of campaign.main for campaigns with these outcomes; None is an interrupted one."""
         made = [mock.Mock(interrupted=one is None, results=one or []) for one in outcomes]
         patches = [mock.patch.object(campaign, name) for name in ("find_program", "find_kernel")]
         patches.append(mock.patch.object(campaign, "once", side_effect=made))

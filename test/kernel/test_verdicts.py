@@ -111,7 +111,7 @@ class Verdicts(Witnessed):
 
 
 class Presses(Witnessed):
-    """Which presses count for nothing because the machine was late beside them."""
+    """Presses during which the machine was late do not count."""
 
     def excused(self, latency_us, *limit):
         return kernel_rig.KernelTest.excused(FAULT_US, latency_us, *limit)

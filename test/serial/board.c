@@ -122,7 +122,7 @@ static gw_wheels_t wheels;
 static brd_host_t host;
 
 /// This board has no flash: a configuration lives as long as the file from which it was read.
-bool brd_host_keep(const brd_settings_t *settings) {
+bool brd_host_store(const brd_settings_t *settings) {
     (void)settings;
     return false;
 }
@@ -172,10 +172,10 @@ static void begin(char **arguments, bool restarted) {
 static iw_time_us_t cycle(void) {
     wheels.now_us = iwl_clock_now_us();
     iwl_hal_poll(&wheels.hal, wheels.now_us);
-    const bool more = brd_host_take(&host, wheels.now_us);
+    const bool more = brd_host_receive(&host, wheels.now_us);
     static iw_snapshot_t seen;
     seen = gw_wheels_step(&wheels);
-    const iw_time_us_t tell_us = brd_host_tell(&host, &seen, wheels.hal.estop_last != 0);
+    const iw_time_us_t tell_us = brd_host_report(&host, &seen, wheels.hal.estop_last != 0);
     brd_serial_step();
     const iw_time_us_t next_us = (tell_us < wheels.step_us) ? tell_us : wheels.step_us;
     return more ? wheels.now_us : next_us;

@@ -19,7 +19,7 @@ typedef struct {
     bool is_input;
     bool pulled_up;
     bool both_edges;
-    unsigned room;   ///< Requested size of the kernel's edge buffer.
+    unsigned buffer_size;   ///< Requested size of the kernel's edge buffer.
     unsigned offset; ///< Requested offset.
     int open;        ///< Chips that are open.
     int requested;   ///< Lines that are requested.
@@ -36,7 +36,7 @@ const char *fake_gpio_name(bool own, unsigned offset);
 const char *fake_gpio_label(void);
 
 /// Returns the number of edges that one read returns.
-int fake_gpio_take(unsigned room);
+int fake_gpio_take(unsigned buffer_size);
 
 /// The line's own chip, its label, the line's name and its offset.
 #define FAKE_GPIO_CHIP   "gpiochip3"

@@ -4,7 +4,7 @@
 #include <string.h>
 
 static void start(permit_rig_t *self, bool restarted) {
-    const iw_permit_view_t good = {.heard = true,
+    const iw_permit_view_t good = {.online = true,
                                    .at_rest = true,
                                    .settled = true,
                                    .output_zero = true,

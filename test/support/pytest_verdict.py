@@ -7,8 +7,9 @@ attempts (Nursery), so modules are imported only once. A class that prepares som
 is "N passed, N failed, N skipped". The exit status is that of verdict.summary.
 
     --build DIR    build under test (build/default)         --jobs N       parallel attempts (2)
-    --virtual      in virtual time: pytest_virtual.py       --sample N     N of the tests, selected by the hash of the commit
-    --keep         keeps the folders of the tests           --pdb          runs all tests in this process and judges nothing
+    --virtual      in virtual time: pytest_virtual.py       --sample N     native tests, and N others selected by the hash of the commit
+    --keep         keeps the folders of the tests           --sample=-N    the tests that --sample N leaves out
+    --pdb          runs all tests in this process and judges nothing
 
 A fixture that is a verdict.Evidence collects the findings of a test. If a test fails, the result of a fixture's `said()` is shown and judged too.
 @pytest.mark.full: only with IWHEEL_FULL=1. @pytest.mark.exact: no result depends on time. record_property("tests", N): the test counts as N tests.
@@ -55,7 +56,9 @@ def pytest_addoption(parser):
     group = parser.getgroup("verdicts")
     group.addoption("--build", default="build/default", metavar="DIR", help="build directory (default: build/default)")
     group.addoption("--jobs", type=int, default=2, metavar="N", help="parallel tests (default: 2)")
-    group.addoption("--sample", type=int, metavar="N", help="only N of the tests; each commit has another sample")
+    group.addoption(
+        "--sample", type=int, metavar="N", help="only the native tests and N others; each commit has another sample; -N: the tests that N leaves out"
+    )
     group.addoption("--virtual", action="store_true", help="run them in virtual time, in the kernel of test/kernel")
     group.addoption("--inside", metavar="PLAN", help="set by guest_pytest.py: pytest runs inside that kernel")
     group.addoption("--keep", action="store_true", help="keep the folders with configuration and outputs")
@@ -78,7 +81,8 @@ def pytest_collection_modifyitems(config, items):
         config.hook.pytest_deselected(items=long)
         items[:] = [item for item in items if item not in long]
     if config.option.sample:
-        left_out = sample(items, commit(config.rootpath))[config.option.sample :]
+        chosen = sample(items, commit(config.rootpath), abs(config.option.sample))
+        left_out = [item for item in items if (item in chosen) != (config.option.sample > 0)]
         config.hook.pytest_deselected(items=left_out)
         items[:] = [item for item in items if item not in left_out]
 
@@ -88,9 +92,11 @@ def commit(folder):
     return subprocess.run(["git", "rev-parse", "HEAD"], cwd=folder, capture_output=True, text=True, check=False).stdout.strip()
 
 
-def sample(items, key):
-    """An order that depends on the key alone: the same commit always has the same sample."""
-    return sorted(items, key=lambda item: hashlib.sha256(f"{key} {item.nodeid}".encode()).digest())
+def sample(items, key, number):
+    """The native tests, and so many others. The key alone selects these, so the same commit always has the same sample."""
+    native = [item for item in items if item.get_closest_marker("native")]
+    others = [item for item in items if item not in native]
+    return native + sorted(others, key=lambda item: hashlib.sha256(f"{key} {item.nodeid}".encode()).digest())[:number]
 
 
 # ---- in the process of an attempt ------------------------------------------------------------------------------------
@@ -302,6 +308,9 @@ class Run(verdict.Session):
         if isinstance(answer, str):
             return verdict.Attempt([verdict.Failure(answer, verdict.CRASH)])
         reports = [self.config.hook.pytest_report_from_serializable(config=self.config, data=data) for data in answer.pop("reports")]
+        for report in reports:
+            if isinstance(report.longrepr, list):  # The place and the reason of a skipped test were a tuple before JSON.
+                report.longrepr = tuple(report.longrepr)
         failures, claims, stalls = ([tuple(one) for report in reports for one in getattr(report, what)] for what in ("failures", "claims", "stalls"))
         if items[0].get_closest_marker("exact"):
             failures = [(text, verdict.RULE) for text, *_ in failures]

@@ -6,6 +6,7 @@ makes the attempts one by one and reports each result. No failure is excused the
 
 @pytest.mark.native("reason"): virtual time cannot show this, for example a race, a flood or a duration; --virtual skips it, by name.
 @pytest.mark.pace(N): in virtual time telemetry comes N times slower than documented; 4 times without the mark (test/kernel/catalogue.py explains why).
+--delays SEED: the system calls of gateway and simulator begin 0 to 2 ms late at random (test/system/hook.c).
 """
 
 import os
@@ -28,7 +29,14 @@ POLL_S = 0.1
 MEMORY_MB = 512
 
 
+def pytest_addoption(parser):
+    help_ = "random delays of 0 to 2 ms at system calls of gateway and simulator"
+    parser.getgroup("verdicts").addoption("--delays", type=int, metavar="SEED", help=help_)
+
+
 def pytest_configure(config):
+    if config.option.delays is not None:
+        os.environ["IWHEEL_DELAYS"] = str(config.option.delays)
     config.addinivalue_line("markers", "native(reason): the test cannot run in virtual time")
     config.addinivalue_line("markers", f"pace(times): in virtual time telemetry is this many times slower; default {PACE}")
 

@@ -46,9 +46,12 @@ def pytest_configure(config):
 
 def pytest_pycollect_makeitem(collector, name, obj):
     """Collects scenarios of any name."""
-    if hasattr(obj, "scenario") and callable(obj):
-        return list(collector._genfunctions(name, obj))
-    return None
+    if not (hasattr(obj, "scenario") and callable(obj)):
+        return None
+    items = list(collector._genfunctions(name, obj))
+    for item in items if obj.native else ():
+        item.add_marker(pytest.mark.native(obj.native))
+    return items
 
 
 def pytest_collection_modifyitems(items):

@@ -39,7 +39,7 @@ iw_pair_t setpoint_rig_take_next(setpoint_rig_t *self) {
 iw_pair_t setpoint_rig_take_after(setpoint_rig_t *self, iw_time_us_t for_us) {
     self->now_us += for_us;
     TEST_ASSERT_TRUE_MESSAGE(iw_setpoint_due(&self->setpoint, self->now_us), "a pair must be due");
-    return iw_setpoint_take(&self->setpoint, self->now_us);
+    return iw_setpoint_next(&self->setpoint, self->now_us);
 }
 
 void setpoint_rig_follow(setpoint_rig_t *self) {

@@ -104,6 +104,15 @@ FAULTS = (
         "pass",
         "test_native_test_is_left_out_of_virtual_time",
     ),
+    ("a test that is skipped inside ends the run", "tuple(report.longrepr)", "report.longrepr", "test_skipped_test_inside_is_named_with_its_reason"),
+    ("no call is late", 'os.environ["IWHEEL_DELAYS"] = ', "_ = ", "test_delays_reach_the_tests_inside"),
+    (
+        "the rest of a sample is the sample",
+        "(item in chosen) != (config.option.sample > 0)",
+        "item not in chosen",
+        "test_sample_has_native_tests_and_the_rest_has_the_others",
+    ),
+    ("a sample can leave out a native test", "return native + sorted", "return sorted", "test_sample_has_native_tests_and_the_rest_has_the_others"),
     ("the sample is always the same", 'f"{key} {item.nodeid}"', "item.nodeid", "test_sample_is_of_the_commit"),
     ("an interrupted run goes on", "        self.over = True\n        self.nursery.close()\n", "", "test_interrupted_run_ends_with_its_tests"),
 )
@@ -562,6 +571,13 @@ class Chosen(Made):
         self.assertEqual(first.cases, again.cases)
         self.assertNotEqual(first.cases, other.cases)
 
+    def test_sample_has_native_tests_and_the_rest_has_the_others(self):
+        many = 'import pytest\n@pytest.mark.parametrize("number", range(9))\ndef test_it(number):\n    pass\n'
+        many += '@pytest.mark.native("a race")\ndef test_race():\n    pass\n'
+        chosen, rest = (self.run_made(many, f"--sample={number}") for number in (4, -4))
+        self.assertEqual(("5 passed, 0 failed, 0 skipped", True), (chosen.last, "test_race" in chosen.cases), chosen.lines)
+        self.assertEqual(("5 passed, 0 failed, 0 skipped", 10), (rest.last, len({**chosen.cases, **rest.cases})), rest.lines)
+
     def test_nothing_that_ran_is_no_success(self):
         for tests, options, last in (
             (self.TWO, ("-k", "nothing"), "0 passed, 0 failed, 0 skipped"),
@@ -620,6 +636,15 @@ class Virtual(Made):
         ran = self.virtual(self.TWO.format("pass"), kernel="raise RuntimeError('no flex')")
         self.assertEqual((77, "0 passed, 0 failed, 2 skipped", []), self.results(ran), ran.lines)
         self.assertIn("skip: test_it.py::test_two: no virtual time: no flex", ran.lines)
+
+    def test_skipped_test_inside_is_named_with_its_reason(self):
+        ran = self.virtual(self.TWO.format('pytest.skip("no wheel")'))
+        self.assertEqual((0, "1 passed, 0 failed, 1 skipped"), (ran.status, ran.last), ran.lines)
+        self.assertIn("skip: test_it.py::test_one: no wheel", ran.lines)
+
+    def test_delays_reach_the_tests_inside(self):
+        ran = self.virtual('def test_one():\n    note(os.environ.get("IWHEEL_DELAYS", "none"))\n', "--delays", "7")
+        self.assertEqual((0, "1 passed, 0 failed, 0 skipped", ["7"]), self.results(ran), ran.lines)
 
     def test_native_test_is_left_out_of_virtual_time(self):
         tests = '@pytest.mark.native("a race")\n' + self.TWO.format("pass")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Starts simulator and gateway in a private folder, keeps the timeline, and ends what it started, by process id."""
+"""Starts simulator and gateway in a private folder, stores the timeline, and ends the started processes by their ids."""
 
 import contextlib
 import ctypes
@@ -19,21 +19,22 @@ sys.path.append(os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__f
 from bus import Bus, now_us
 from client import Client
 from judge import Judge
-from judge_log import PAIR_REAL_US, Config, Event
+from judge_log import ESTOP_US, PAIR_REAL_US, Config, Event
 from verdict import die_with_parent
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 SERVICE_NICE = -10
 PACE = {"slow": 1}  # how many times slower than documented telemetry comes, where time is virtual: test/kernel/catalogue.py
-WORDS = 800  # of a program's, beside a failure
-RESTART_US = 300_000  # row 25: it answers, and so sends its zeros, this soon after a restart
+WORDS = 800  # characters of a program's output that are shown with a failure
+DELAYED_US = 6_000  # with --delays: three system calls between the button and the zero pair begin 2 ms late
+RESTART_US = 300_000  # row 25: the gateway answers within this time after a restart, and has then sent its zeros
 DEFAULTS = {"wheels": {"setpoint_type": 1, "current_role": "limit", "track_mm": 540}, "drive": {}, "northbound": {"mode": "0600"}}
 
 
 STRANGER = 65534
 BECOME_STRANGER = f"""
 import os, signal, socket, sys
-os.setgroups([]); os.setgid({STRANGER}); os.setuid({STRANGER})  # Only now: he may not be able to read our Python.
+os.setgroups([]); os.setgid({STRANGER}); os.setuid({STRANGER})  # After the imports: that user may have no right to read our Python.
 """
 HOLD_NAMES = f"""{BECOME_STRANGER}
 held = []
@@ -48,7 +49,7 @@ signal.pause()
 
 
 def lock_names(bus):
-    """What root's gateway would call itself in the network namespace: app/gateway/lock/bus_names.h."""
+    """The names of root's gateway in the network namespace: app/gateway/lock/bus_names.h."""
     key = bus
     if bus.startswith("unix:"):
         value = 0xCBF29CE484222325
@@ -65,7 +66,7 @@ def become_stranger():
 
 
 def read_only(folder):
-    """To be called in a new process of root: there the folder is on a file system that is mounted for reading only."""
+    """Returns a function for a new process of root: it mounts a read-only file system at the folder."""
 
     def mount():
         libc = ctypes.CDLL(None, use_errno=True)
@@ -81,7 +82,7 @@ def read_only(folder):
 
 
 def children(pid):
-    """{name: process number} of its children, on every kernel: /proc/PID/task/PID/children is an option of it."""
+    """{name: process number} of its children, on every kernel: not every kernel has /proc/PID/task/PID/children."""
     found = {}
     for stat in glob.glob("/proc/[0-9]*/stat"):
         with contextlib.suppress(FileNotFoundError, ProcessLookupError), open(stat, encoding="utf-8", errors="replace") as file:
@@ -93,9 +94,28 @@ def children(pid):
 
 
 def as_a_service():
-    """The priority that a service would have, where that is allowed: these processes must not wait for the scenarios."""
+    """Sets the priority of a service, if permitted: these processes must not wait for the scenarios."""
     with contextlib.suppress(PermissionError):
         os.setpriority(os.PRIO_PROCESS, 0, SERVICE_NICE)
+
+
+def hook_library(build):
+    """The library that delays system calls of a program and lets them hang: hook.c."""
+    path = os.path.join(build, "test", "system", "libiwheel_hook.so")
+    if not os.path.exists(path):  # The loader would only print a warning.
+        raise FileNotFoundError(f"{path} is missing; build it first: cmake --build {build} --target iwheel_hook")
+    return path
+
+
+def delayed(build):
+    """In a child, before it becomes a program: with pytest's --delays, its system calls begin 0 to 2 ms late at random."""
+    if "IWHEEL_DELAYS" in os.environ:
+        os.environ["LD_PRELOAD"] = hook_library(build)
+
+
+def estop_limit_us():
+    """The limit of the 99th percentile of the time from the e-stop to the zero pair."""
+    return ESTOP_US + (DELAYED_US if "IWHEEL_DELAYS" in os.environ else 0)
 
 
 class Process:
@@ -165,7 +185,7 @@ class Sim:
             *rig.sim_arguments(),
             *extra,
         ]
-        self.process = Process(command, rig.path("sim.out"))
+        self.process = Process(command, rig.path("sim.out"), lambda: delayed(rig.build))
         self.control = wait_connect(rig.path("control"), self.process)
         self.lines = self.control.makefile("r")
 
@@ -205,6 +225,8 @@ def wait_connect(path, process, seconds=5.0):
 class Rig:
     """One simulator, one bus recorder, one gateway (restartable), one timeline."""
 
+    exit_clears = True  # The simulator forgets the waiting frames of a client that ends; a kernel does not.
+
     def __init__(self, build, config=None, sim_args=(), estop=True):
         self.build = build
         self.folder = tempfile.mkdtemp(prefix="iwheel-")
@@ -230,10 +252,10 @@ class Rig:
         self.sim = self.start_wheels(sim_args)
         self.bus = self.listen()
 
-    # What a rig on another bus does in another way (test/kernel) ------------------------------------------------------
+    # Steps that differ on another bus (test/kernel) ------------------------------------------------------
 
     def prepare(self):
-        """Before anything is started."""
+        """Called before any program starts."""
 
     def start_wheels(self, sim_args):
         """Two wheels and their bus."""
@@ -248,19 +270,19 @@ class Rig:
         return ("--script", self.path("pace"))
 
     def listen(self, frames=None):
-        """The recorder of the bus; `frames` are what another one had recorded before."""
+        """The recorder of the bus; `frames`: the frames of an earlier recorder."""
         return Bus(self.path("bus"), frames)
 
     def wheels_bus(self):
-        """What the simulator gets as --can."""
+        """The simulator's --can."""
         return f"unix:{self.path('bus')}"
 
     def gateway_bus(self):
-        """What the gateway gets as --can."""
+        """The gateway's --can."""
         return self.wheels_bus()
 
     def estop_line(self):
-        """What the gateway gets as --estop."""
+        """The gateway's --estop."""
         return f"unix:{self.path(self.button)}" if self.estop else "none"
 
     # Files and configuration ------------------------------------------------------------------------------------------
@@ -283,7 +305,7 @@ class Rig:
             setpoint_type=wheels["setpoint_type"],
             role=wheels["current_role"],
             dlc=wheels.get("setpoint_dlc", 5),
-            track_mm=wheels.get("track_mm", 540),  # Without one nothing is judged by it: nothing moves.
+            track_mm=wheels.get("track_mm", 540),  # Without a track nothing moves, so the value judges nothing.
             radius_mm=wheels.get("radius_mm", 192),
             invert=tuple(self.settings.get(side, {}).get("invert") == "yes" for side in ("left", "right")),
             **values,
@@ -306,9 +328,15 @@ class Rig:
         ]
 
     def start_gateway(self, *extra, setup=None, wheels=True, restart_hold=False):
-        """Starts it and waits until it answers, and with `wheels` until both are heard. Returns the milliseconds to the answer."""
+        """Starts the gateway and waits until it answers, and with `wheels` until both are online. Returns the milliseconds to the answer."""
         begin_us = now_us()
-        self.gateway = Process(self.gateway_command(*extra), self.path("gateway.out"), setup)
+
+        def prepare():
+            delayed(self.build)
+            if setup:
+                setup()
+
+        self.gateway = Process(self.gateway_command(*extra), self.path("gateway.out"), prepare)
         self.processes.append(self.gateway)
         self.timeline.append(Event(begin_us, "start"))
         if restart_hold:
@@ -326,7 +354,7 @@ class Rig:
         return answered_ms
 
     def wait_status(self, client, condition, seconds=4.0):
-        """Asks until the snapshot fulfils the condition; returns it, or None after that time."""
+        """Polls the status until it fulfils the condition; returns it, or None after that time."""
         deadline = time.monotonic() + seconds
         while True:
             status = client.request("status")
@@ -367,7 +395,7 @@ class Rig:
         return process
 
     def take_events(self, process):
-        """What a drive_client.py wrote, into the timeline."""
+        """Adds the output of a drive_client.py to the timeline."""
         for line in process.text().splitlines():
             words = line.split()
             if len(words) == len(Event._fields):
@@ -375,7 +403,7 @@ class Rig:
                 self.timeline.append(Event(*numbers)._replace(ok=words[3] == "True"))
 
     def restart_sim(self, frames):
-        """Another simulator after the first one died; `frames` are what the recorder had until then."""
+        """Starts another simulator after the first one ended; `frames`: the frames of the recorder until then."""
         self.sim.end()
         self.sim = Sim(self)
         self.bus = self.listen(frames)
@@ -405,12 +433,19 @@ class Rig:
         finished_us = now_us() - 20_000
         self.bus.close()
         frames = [frame for frame in self.bus.frames if frame.t_us <= finished_us]
-        judge = Judge(self.judge_config(), frames, self.timeline, moves=moves, finished_us=finished_us, **{"pair_limit_us": PAIR_REAL_US, **options})
+        judge = Judge(
+            self.judge_config(),
+            frames,
+            self.timeline,
+            moves=moves,
+            finished_us=finished_us,
+            **{"pair_limit_us": PAIR_REAL_US, "estop_limit_us": estop_limit_us(), "exit_clears": self.exit_clears, **options},
+        )
         judge.judge()
         return judge
 
     def said(self):
-        """What is told beside a failure."""
+        """The output that is shown with a failure."""
         return self.gateway.text()[-WORDS:] if self.gateway else ""
 
     def close(self, keep=False):
@@ -424,7 +459,7 @@ class Rig:
             self.remove_folder()
 
     def remove_folder(self):
-        """Once the gateway's own helpers have ended, which write their last file after it, and would make the folder again."""
+        """Waits for the gateway's helpers, which write their last file after the gateway has ended and would make the folder again."""
         end = time.monotonic() + 3
         while self.is_used() and time.monotonic() < end:
             time.sleep(0.01)

@@ -2,7 +2,7 @@
 """Decides from a bus log and a timeline whether the safety rules were kept.
 
 Written from the rules of motion permission, not from the gateway's code. The bus log is the only witness of what the gateway
-did; the timeline tells what was done to it. Times are integer microseconds of CLOCK_MONOTONIC; see judge_log.py for the timeline.
+did; the timeline lists the actions of the scenario. Times are integer microseconds of CLOCK_MONOTONIC; see judge_log.py for the timeline.
 """
 
 import bisect
@@ -69,7 +69,7 @@ class Judge(Reading):
         session, t_us = self._session_at(setpoint.t_us), setpoint.t_us
         name = f"{'left' if setpoint.side == 0 else 'right'} {setpoint.speed} mm/s"
         if session is None:
-            self._say("motion_unarmed", t_us, f"{name} although nobody had armed")
+            self._say("motion_unarmed", t_us, f"{name} although no client had armed")
             return
         drives = [drive for drive in session.drives if drive.kind == "drive" and drive.t_us <= t_us]
         if not any(drive.left or drive.right for drive in drives):
@@ -217,8 +217,9 @@ class Judge(Reading):
             self._say("pair", waiting.t_us, "a left setpoint without its right one", 0)
 
     def _alone(self, setpoint):
-        """A pair may be broken only by the death of the process in its middle, or by the end of the recording."""
-        died = any(event.kind == "end" and abs(event.t_us - setpoint.t_us) < JITTER_US for event in self.events)
+        """A pair may be broken only by the death of the process in its middle, or by the end of the recording; a zero pair by an exit that clears."""
+        kinds = ("end", "exit") if self.exit_clears and setpoint.zero else ("end",)
+        died = any(event.kind in kinds and abs(event.t_us - setpoint.t_us) < JITTER_US for event in self.events)
         return not died and setpoint.t_us < self.finished_us - PAIR_US
 
     def _presence(self, session, next_us):
@@ -235,7 +236,7 @@ class Judge(Reading):
             self._silence(session, times, next_us)
 
     def _told_silent(self, session, next_us):
-        """The gateway said so or has left: what is missing then will not come any more."""
+        """The gateway reported the end, or it has exited: no later setpoint is expected."""
         begin_us = max((at for at, _, _ in session.ends), default=next_us)
         return any(event.kind in ("silent", "exit") and begin_us < event.t_us <= next_us for event in self.events)
 
@@ -255,7 +256,7 @@ class Judge(Reading):
         end_us = session.end_us()
         if end_us is None:
             return None
-        within_us = max(within for at, _, within in session.ends if at == end_us)  # what cuts the bus may take its time
+        within_us = max(within for at, _, within in session.ends if at == end_us)  # an action that cuts the bus may last a while
         if any(begin <= end_us + within_us + GAP_US and end_us < alive for begin, alive in self.dead):
             return end_us
         last = None
@@ -283,7 +284,7 @@ class Judge(Reading):
         """When both wheels have been at rest for the settling time, at from_us or later. Unheard is not at rest."""
         since = {SPEED_IDS[0]: None, SPEED_IDS[1]: None}
         heard = dict(since)
-        # What was before the settling time does not matter: a wheel at rest is heard again within UNHEARD_US.
+        # What was before the settling time does not matter: telemetry of a wheel at standstill is back within UNHEARD_US.
         first = bisect.bisect_left(self._frame_times, from_us - SETTLED_US - 2 * UNHEARD_US)
         for frame in itertools.islice(self.frames, first, None):
             if frame.id not in since or frame.own or len(frame.data) < 2:
@@ -325,7 +326,7 @@ class Judge(Reading):
         """Nothing is sent before arm, and nothing while no gateway runs."""
         for setpoint in self.setpoints:
             if self._session_at(setpoint.t_us) is None:
-                self._say("sent_in_listening", setpoint.t_us, "a setpoint although nobody had asked to arm")
+                self._say("sent_in_listening", setpoint.t_us, "a setpoint although no client had asked to arm")
                 return
         for reset in (event for event in self.events if event.kind == "reset" and event.ok):
             index = bisect.bisect_left(self._begins, reset.t_us)

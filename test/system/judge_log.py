@@ -3,13 +3,13 @@
 
 Times are integer microseconds of CLOCK_MONOTONIC. Timeline events (Event.kind):
   start, end        the gateway process was started; is gone (killed or exited)
-  restart_hold      it was started after a crash: zeros are due at once although nobody armed
-  arm, drive, reset a request was sent at t_us and answered at done_us; ok tells the answer; drive has left, right (mm/s)
-  stop, gone        somebody said stop; the holder of the lease disconnected: ramp
-  press, estop      the button was pressed; a client said estop: zero at once
+  restart_hold      it was started after a crash: zeros are due immediately although no client armed
+  arm, drive, reset a request was sent at t_us and answered at done_us; ok: the answer; drive has left, right (mm/s)
+  stop, gone        a client sent stop; the holder of the lease disconnected: ramp
+  press, estop      the button was pressed; a client sent estop: zero immediately
   cut, ramp         the scenario caused something that must stop the wheels within within_us, without or with ramp
-  silent, exit      the gateway says that it listens again; it ended by itself, after its hold
-  dead, alive       the bus takes no frames any more; takes them again
+  silent, exit      the gateway reports that it listens again; it exited on its own, after its hold
+  dead, alive       the bus accepts no frames any more; accepts them again
 """
 
 import bisect
@@ -106,8 +106,9 @@ def signed(data, at):
 class Reading:
     """Setpoints, sessions and windows of a dead bus, and what is wrong with their form. `found` collects violations."""
 
-    def __init__(self, config, frames, events, moves=True, finished_us=None, estop_limit_us=ESTOP_US, pair_limit_us=PAIR_US):
+    def __init__(self, config, frames, events, moves=True, finished_us=None, estop_limit_us=ESTOP_US, pair_limit_us=PAIR_US, exit_clears=False):
         self.config, self.moves, self.estop_limit_us, self.pair_limit_us = config, moves, estop_limit_us, pair_limit_us
+        self.exit_clears = exit_clears  # The bus loses the frames that a program sent just before it exited.
         self.frames = sorted(frames, key=lambda frame: frame.t_us)
         self.events = sorted(events, key=lambda event: event.t_us)
         self.finished_us = finished_us or (self.frames[-1].t_us if self.frames else 0)
@@ -135,7 +136,7 @@ class Reading:
         return windows + ([(since, 1 << 62)] if since is not None else [])
 
     def _first_out_us(self, alive_us):
-        """The bus takes frames again when one comes out: a wheel that has power first starts, then acknowledges."""
+        """The bus accepts frames again when one is on it: a wheel that has power first starts, then acknowledges."""
         return next(
             (frame.t_us for frame in self.frames if frame.id in (LEFT, RIGHT) and not frame.own and alive_us <= frame.t_us < alive_us + RESIDUAL_US), alive_us
         )
@@ -167,7 +168,7 @@ class Reading:
         self._frame_times = [frame.t_us for frame in self.frames]
 
     def _setpoints_between(self, from_us, to_us=1 << 62):
-        """Those at from_us or later and before to_us: long logs are not looked through from their beginning each time."""
+        """Those at from_us or later and before to_us: the search in long logs does not begin at their start each time."""
         times = self._setpoint_times
         return self.setpoints[bisect.bisect_left(times, from_us) : bisect.bisect_left(times, to_us)]
 
@@ -198,7 +199,7 @@ class Reading:
         self._read_turn()
 
     def _read_turn(self):
-        """The right wheel's setpoint completes a pair, which turns the real machine. A wheel takes its radius to be 192 mm."""
+        """The right wheel's setpoint completes a pair, which turns the real machine. A wheel assumes a radius of 192 mm."""
         config, (left, right) = self.config, self.setpoints[-2:] if len(self.setpoints) > 1 else (None, None)
         if left is None or (left.side, right.side) != (0, 1) or right.t_us - left.t_us > PAIR_US:
             return
@@ -234,7 +235,7 @@ class Reading:
             session.ends.append((event.t_us, kinds[event.kind], event.within_us))
 
     def _lapse(self, session):
-        """The lease ends by itself; a drive that comes after that must have been refused."""
+        """The lease ends on its own; a drive after that must have been refused."""
         config, previous = self.config, None
         for drive in session.drives:
             if previous is not None and drive.kind == "drive":

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a scenario is given: a rig, checks, figures. Scenarios register themselves with @scenario."""
+"""The argument of a scenario: a rig, checks, figures. @scenario registers scenarios."""
 
 import time
 import unittest
@@ -9,11 +9,11 @@ from judge_log import percentile
 from verdict import CHECK, RULE, TIMING, Evidence, Failure
 
 REGISTRY = {}
-# Refusals of arm that pass by themselves: the wheels roll out, or the last zero is still on its way.
+# Refusals of arm that end without an action: the wheels roll out, or the last zero is not on the bus yet.
 AWAITED = ("not_at_rest", "stale_command", "cause_present", "send_stalled")
 
 
-# Whatever stands or falls with how often a wheel speaks: telemetry comes as documented also where time is virtual.
+# These depend on the rate of the telemetry: it is as documented in virtual time too.
 AS_DOCUMENTED = ("nominal_drive_and_turn", "force_offset_and_tare", "row23_", "trap12_", "frames_", "ledger_", "memory_", "tare_")
 
 
@@ -26,14 +26,14 @@ def as_documented(name):
 
 
 class Skip(unittest.SkipTest):
-    """Cannot be tested here; the text says what is missing."""
+    """This cannot be tested here; the text names the missing part."""
 
 
-def scenario(title, seconds=5):
-    """`seconds`: roughly how long it takes; the longest start first."""
+def scenario(title, seconds=5, native=""):
+    """`seconds`: the approximate duration; the longest start first. `native`: why virtual time cannot show it, as in pytest_virtual.py."""
 
     def register(function):
-        function.scenario = title, seconds
+        function.scenario, function.native = (title, seconds), native
         REGISTRY[function.__name__] = (title, seconds, function)
         return function
 
@@ -41,7 +41,7 @@ def scenario(title, seconds=5):
 
 
 class Test(Evidence):
-    """Collects failures as verdict.Failure. Figures, and stalls that the test itself has seen, go with them."""
+    """Collects failures as verdict.Failure, figures, and stalls that the test itself has measured."""
 
     __test__ = False  # pytest does not look for tests in it.
     rig_type = Rig
@@ -60,7 +60,7 @@ class Test(Evidence):
         return rig
 
     def running(self, config=None, **options):
-        """A rig with the gateway up, both wheels heard and at rest, and a client."""
+        """A rig with a running gateway, both wheels online and at standstill, and a client."""
         rig = self.rig(config, **options)
         rig.start_gateway()
         return rig, rig.client()
@@ -81,8 +81,8 @@ class Test(Evidence):
         """The reply is ok, or has that error and a message worth reading."""
         if error is None:
             return self.check(reply["ok"], f"refused: {reply.get('error')}: {reply.get('message')}")
-        told = self.check(not reply["ok"] and reply["error"] == error, f"{error} expected, got {reply}")
-        return told and self.check(len(reply.get("message") or "") > 10, f"{error} without a message: {reply}")
+        refused = self.check(not reply["ok"] and reply["error"] == error, f"{error} expected, got {reply}")
+        return refused and self.check(len(reply.get("message") or "") > 10, f"{error} without a message: {reply}")
 
     def arm(self, client, **fields):
         """Arms; tries again for a while if the wheels are not at rest yet."""
@@ -100,9 +100,9 @@ class Test(Evidence):
         self.check(refusal is None, f"drive was refused: {refusal}")
 
     def stopped_by(self, client, cause, state="latched"):
-        """`why` names that cause, and the state is as told."""
+        """Checks that `why` names that cause, and that the state is `state`."""
         why, status = client.request("why"), client.request("status")
-        self.check(why.get("cause") == cause, f"cause {cause} expected, why says {why.get('cause')}: {why.get('sentence')}")
+        self.check(why.get("cause") == cause, f"cause {cause} expected, why reports {why.get('cause')}: {why.get('sentence')}")
         self.check(status["state"] == state, f"state {state} expected, it is {status['state']}")
         self.check(len(why.get("sentence") or "") > 20, f"why has no sentence: {why}")
         return why

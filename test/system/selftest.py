@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Does the judge catch what it must? Good logs pass; every planted fault is found under the rule it breaks.
+"""The judge detects each fault. Good logs pass; every seeded fault is found under the rule it breaks.
 
 The logs come from a small ideal gateway written here, so that a judge that always says "good" or always "bad" fails.
 """
@@ -140,6 +140,12 @@ def only(side, change):
     return lambda frame: change(frame) if (frame.id == RIGHT) == bool(side) else frame
 
 
+def broken_at_exit(frames, events):
+    """The last right setpoint is missing, and the gateway exits."""
+    last = [frame for frame in frames if is_setpoint(frame)][-1]
+    return [frame for frame in frames if frame is not last], [*events, Event(last.t_us + MS, "exit")]
+
+
 def faults():
     """(name, frames, events, the rule that must be named[, options])"""
     f, e = good(), script()
@@ -165,6 +171,7 @@ def faults():
     yield "ended 700 ms too early", between(f, 10_590, 99_999, drop), [*e, Event(10600 * MS, "exit")], "gap", {"finished_us": 10_700 * MS}
     yield "hold that never ends", add(f, *stream), e, "no_silence"
     yield "left without right", between(f, 2_000, 2_020, only(1, drop)), e, "pair"
+    yield "left without right at an exit", *broken_at_exit(f, e), "pair"
     yield "right without left", between(f, 2_000, 2_020, only(0, drop)), e, "pair"
     yield "right 10 ms after left", between(f, 2_000, 2_020, only(1, late(10))), e, "pair_spread"
     tick = {"pair_limit_us": 15 * MS}
@@ -253,10 +260,11 @@ def goods():
     )
     muted = [x for x in f if x.id != 256 or not 6_900 * MS <= x.t_us < 8_300 * MS]
     more = [frame for ms in range(8_370, 8_800, 20) for frame in pair(ms, 0, 0)]
-    yield "a hold that waits for a wheel that was not heard in it", add(muted, *more), e, {}
+    yield "a hold that waits for a wheel that was offline in it", add(muted, *more), e, {}
     seam = [Event(7_000 * MS, "dead"), Event(7_201_100, "alive", 7_201_100)]  # over between left and right
     yield "a pair on the seam of a dead bus", f, e + seam, {}
     yield "right 10 ms after left, a tick allowed", between(f, 2_000, 2_020, only(1, late(10))), e, {"pair_limit_us": 15 * MS}
+    yield "left without right at an exit, on a bus that this clears", *broken_at_exit(f, e), {"exit_clears": True}
     yield "no motion wanted, none made", [x for x in f if not is_setpoint(x)], [e[0]], {"moves": False}
 
 
@@ -274,7 +282,7 @@ def run():
         options = dict(options[0]) if options else {}
         found = {v.rule for v in verdict(frames, events, options.pop("config", CONFIG), **options)}
         if rule not in found:
-            failures.append(f"planted fault '{name}' was not found as {rule} (found: {', '.join(sorted(found)) or 'nothing'})")
+            failures.append(f"seeded fault '{name}' was not found as {rule} (found: {', '.join(sorted(found)) or 'nothing'})")
     return count, failures
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The judge finds every planted fault."""
+"""The judge detects every seeded fault."""
 
 import selftest
 from verdict import hold

@@ -14,7 +14,7 @@ class Found(Exception):
 
 
 class Nothing:
-    """In the place of a rig: tells what a scenario does with it first."""
+    """Replaces a rig: reports which use a scenario makes of it first."""
 
     def __getattr__(self, name):
         raise Found(None)
@@ -63,6 +63,6 @@ def apart(function, *arguments):
             os._exit(0)
     os.close(writing)
     with os.fdopen(reading, "rb") as pipe:
-        told = pipe.read()
+        sent = pipe.read()
     os.waitpid(child, 0)
-    return pickle.loads(told) if told else None
+    return pickle.loads(sent) if sent else None

@@ -2,9 +2,9 @@
 /// A model of bxCAN at the level of its registers, written from the reference manual (RM0008 chapter 24, RM0090 chapter 32), not from
 /// any driver: modes and their handshakes, transmit mailboxes, receive FIFOs, filters, error counters, bus-off, interrupts.
 ///
-/// On one side a program reads and writes registers by offset. On the other side a bus, which the test plays, offers frames and
-/// recessive time and takes what the mailboxes send. What the manual forbids, or what reads a value that means nothing, is written
-/// down as a violation: a test without violations is part of every verdict.
+/// On one side a program reads and writes registers by offset. On the other side the test plays the bus: it offers frames and
+/// recessive time, and receives the frames of the mailboxes. The model records a violation for each access that the manual
+/// forbids, and for each read of a meaningless value. Every verdict demands that there is no violation.
 ///
 /// Not modelled: time stamps (TTCM), wake-up by bus (AWUM), loop-back, FIFO 1's interrupts, TSR.LOW.
 #ifndef BXCAN_MODEL_H
@@ -90,8 +90,8 @@ bool bxcan_model_is_on(const bxcan_model_t *self);
 void bxcan_model_recessive(bxcan_model_t *self, uint32_t bits);
 void bxcan_model_dominant(bxcan_model_t *self);
 
-/// The bus is held dominant for that many bits, and was right before unless recessive bits were told. `transmitting`: it began within a
-/// frame of this node.
+/// The bus is held dominant for that many bits; before, it was normal unless the test reported recessive bits. `transmitting`: it
+/// began within a frame of this node.
 void bxcan_model_hold(bxcan_model_t *self, uint32_t bits, bool transmitting);
 
 /// The mailbox that it would send next, with its frame; MODEL_NONE: none, or it may not.
@@ -102,10 +102,10 @@ void bxcan_model_begin(bxcan_model_t *self, int mailbox);
 void bxcan_model_end(bxcan_model_t *self, int mailbox, model_end_t end);
 
 /// Another node's frame came whole. True if it was acknowledged.
-bool bxcan_model_hear(bxcan_model_t *self, const model_frame_t *frame);
+bool bxcan_model_receive(bxcan_model_t *self, const model_frame_t *frame);
 
 /// Another node's frame was destroyed.
-void bxcan_model_hear_error(bxcan_model_t *self);
+void bxcan_model_receive_error(bxcan_model_t *self);
 
 /// Interrupt lines, as levels; `lines` has all three: bit 0 transmit, 1 FIFO 0, 2 status change and error.
 bool bxcan_model_irq_transmit(const bxcan_model_t *self);

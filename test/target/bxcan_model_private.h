@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// What the two halves of the model share: the bits of chapter 9, and the receive side.
+/// Definitions that both halves of the model share: the bits of chapter 9, and the receive side.
 #ifndef BXCAN_MODEL_PRIVATE_H
 #define BXCAN_MODEL_PRIVATE_H
 

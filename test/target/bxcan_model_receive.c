@@ -115,7 +115,7 @@ static void store(bxcan_model_t *self, model_fifo_t *fifo, const model_frame_t *
     }
 }
 
-bool bxcan_model_hear(bxcan_model_t *self, const model_frame_t *frame) {
+bool bxcan_model_receive(bxcan_model_t *self, const model_frame_t *frame) {
     bxcan_model_dominant(self);
     if (!bxcan_model_is_on(self)) {
         return false;
@@ -160,7 +160,7 @@ void bxcan_model_hold(bxcan_model_t *self, uint32_t bits, bool transmitting) {
     }
 }
 
-void bxcan_model_hear_error(bxcan_model_t *self) {
+void bxcan_model_receive_error(bxcan_model_t *self) {
     bxcan_model_dominant(self);
     if (bxcan_model_is_on(self)) {
         self->rec = (self->rec < 255U) ? self->rec + 1U : 255U;

@@ -200,7 +200,7 @@ void rig_assert_lec(int device, uint32_t code) {
 
 bool rig_hear(int device, uint32_t id, uint8_t dlc) {
     const model_frame_t frame = {.id = id, .dlc = dlc, .data = {1, 2, 3, 4, 5, 6, 7, 8}};
-    const bool acknowledged = can_model_hear(&rig[device].model, &frame);
+    const bool acknowledged = can_model_receive(&rig[device].model, &frame);
     serve(&rig[device]);
     return acknowledged;
 }

@@ -28,8 +28,8 @@ typedef fdcan_model_t can_model_t;
 #define can_model_offer            fdcan_model_offer
 #define can_model_begin            fdcan_model_begin
 #define can_model_end              fdcan_model_end
-#define can_model_hear             fdcan_model_hear
-#define can_model_hear_error       fdcan_model_hear_error
+#define can_model_receive          fdcan_model_receive
+#define can_model_receive_error    fdcan_model_receive_error
 #define can_model_violation        fdcan_model_violation
 #define can_model_irq_error(model) (fdcan_model_lines(model) != 0U)
 #define RIG_MASK_REGISTER          0x54U ///< IE, with the bits that mask the completions.
@@ -68,8 +68,8 @@ typedef bxcan_model_t can_model_t;
 #define can_model_offer            bxcan_model_offer
 #define can_model_begin            bxcan_model_begin
 #define can_model_end              bxcan_model_end
-#define can_model_hear             bxcan_model_hear
-#define can_model_hear_error       bxcan_model_hear_error
+#define can_model_receive          bxcan_model_receive
+#define can_model_receive_error    bxcan_model_receive_error
 #define can_model_violation        bxcan_model_violation
 #define can_model_irq_error(model) bxcan_model_irq_error(model)
 #define RIG_MASK_REGISTER          0x14U ///< IER

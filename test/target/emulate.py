@@ -57,7 +57,7 @@ class Rig:
         return int.from_bytes(self.machine.cpu.mem_read(*symbols.variable(self.elf, name)), "little")
 
     def console(self):
-        """The lines that it told so far."""
+        """The lines that it has printed so far."""
         return self.machine.uart.sent.decode("ascii").split("\r\n")
 
     def function(self, name):

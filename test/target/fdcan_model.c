@@ -489,7 +489,7 @@ static void store(fdcan_model_t *self, const model_frame_t *frame) {
     self->ir |= IR_RF0N;
 }
 
-bool fdcan_model_hear(fdcan_model_t *self, const model_frame_t *frame) {
+bool fdcan_model_receive(fdcan_model_t *self, const model_frame_t *frame) {
     fdcan_model_dominant(self);
     if (!fdcan_model_is_on(self)) {
         return false;
@@ -504,9 +504,9 @@ bool fdcan_model_hear(fdcan_model_t *self, const model_frame_t *frame) {
 }
 
 /// M_CAN 3.1.3: without FDOE the recessive FDF bit is a protocol exception, and an error only if that handling is off.
-bool fdcan_model_hear_fd(fdcan_model_t *self) {
+bool fdcan_model_receive_fd(fdcan_model_t *self) {
     if ((self->cccr & (CCCR_PXHD | CCCR_FDOE)) != 0U) {
-        fdcan_model_hear_error(self);
+        fdcan_model_receive_error(self);
         return true;
     }
     self->exception = fdcan_model_is_on(self);
@@ -529,7 +529,7 @@ void fdcan_model_hold(fdcan_model_t *self, uint32_t bits, bool transmitting) {
     }
 }
 
-void fdcan_model_hear_error(fdcan_model_t *self) {
+void fdcan_model_receive_error(fdcan_model_t *self) {
     fdcan_model_dominant(self);
     if (fdcan_model_is_on(self)) {
         self->rec = (self->rec < 255U) ? self->rec + 1U : 255U;

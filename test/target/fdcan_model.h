@@ -50,10 +50,10 @@ void fdcan_model_hold(fdcan_model_t *self, uint32_t bits, bool transmitting);
 int fdcan_model_offer(const fdcan_model_t *self, model_frame_t *out_frame);
 void fdcan_model_begin(fdcan_model_t *self, int buffer);
 void fdcan_model_end(fdcan_model_t *self, int buffer, model_end_t end);
-bool fdcan_model_hear(fdcan_model_t *self, const model_frame_t *frame);
-void fdcan_model_hear_error(fdcan_model_t *self);
+bool fdcan_model_receive(fdcan_model_t *self, const model_frame_t *frame);
+void fdcan_model_receive_error(fdcan_model_t *self);
 /// Another node sends an FD frame. Returns true if the controller destroys it.
-bool fdcan_model_hear_fd(fdcan_model_t *self);
+bool fdcan_model_receive_fd(fdcan_model_t *self);
 /// Bit 0: interrupt line 0.
 uint32_t fdcan_model_lines(const fdcan_model_t *self);
 void fdcan_model_slow_aborts(fdcan_model_t *self, uint32_t reads);

@@ -115,9 +115,9 @@ static void send_slots(void) {
 /// Both wheels follow their commands.
 static void send_telemetry(void) {
     for (size_t side = 0; side < IW_SIDES; side++) {
-        const iw_codec_wheel_t told = {.speed = {.speed_rpm = (int16_t)(commanded_mm_s[side] / 20)}};
+        const iw_codec_wheel_t values = {.speed = {.speed_rpm = (int16_t)(commanded_mm_s[side] / 20)}};
         iw_can_frame_t frame;
-        (void)iw_codec_encode(IW_CODEC_SPEED, (iw_side_t)side, &told, &frame);
+        (void)iw_codec_encode(IW_CODEC_SPEED, (iw_side_t)side, &values, &frame);
         put(&frame);
     }
     telemetry_us += 4000U;

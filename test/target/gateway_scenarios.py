@@ -90,8 +90,8 @@ def both_words_and_turns(rig):
     assert host.ask(1, {"cmd": "confirm", "item": "mount_sign_left"})["state"] == "confirmed"
     assert host.ask(1, {"cmd": "confirm", "item": "gear_ratio", "value": "2/2"})["state"] == "confirmed"
     rig.run(20 * MS)
-    told = [event["item"] for event in host.events("ledger") if event["evidence"] == "operator"]
-    assert told == ["wheel_radius", "mount_sign_left", "mount_sign_left", "gear_ratio"], told
+    items = [event["item"] for event in host.events("ledger") if event["evidence"] == "operator"]
+    assert items == ["wheel_radius", "mount_sign_left", "mount_sign_left", "gear_ratio"], items
     host.ask(1, {"cmd": "watch", "topics": []})
     rig.run(2500 * MS)
     tared = host.ask(1, {"cmd": "tare", "side": "left"})
@@ -119,7 +119,7 @@ def lease_alone(rig):
 
 
 def close_ends(rig):
-    """A closed channel ends its lease at once."""
+    """A closed channel ends its lease immediately."""
     host = start_driving(rig)
     host.say(0, {"cmd": "close", "channel": 1})
     assert_stops(rig, rig.machine.now_ns, PERIOD_NS + RAMP_NS)
@@ -128,7 +128,7 @@ def close_ends(rig):
 
 
 def silent_relay(rig):
-    """Nothing of the relay for half a second: every channel has ended, and is opened anew before anybody is heard."""
+    """The relay sends nothing for half a second: every channel ends, and must be opened again before the board accepts a client."""
     host = start_driving(rig)
     host.open(2, watch=True)
     host.fall_silent()
@@ -199,7 +199,7 @@ def stale_in_every_way(rig):
 
 
 def nobody_feeds_another(rig):
-    """A second client with good commands of its own is refused, and does not keep the first one's lease."""
+    """The board refuses the good commands of a second client, and they do not extend the lease of the first one."""
     host = start_driving(rig)
     host.open(2)
     last_ns = rig.machine.now_ns - 20 * MS
@@ -320,10 +320,10 @@ def reset_in_motion(rig):
             rig.run(20 * MS)
         if len(boots) == 1:
             after = rig.setpoints(reset_ns)
-            assert after and not moving(rig, reset_ns), "the wheels were not told to stand"
+            assert after and not moving(rig, reset_ns), "the wheels were not commanded to zero"
         else:
             hung = [when for when, cause in rig.machine.resets if cause == "watchdog"]
-            assert hung and not moving(rig, hung[-1]), "the wheels were not told to stand"
+            assert hung and not moving(rig, hung[-1]), "the wheels were not commanded to zero"
         rig.run(1800 * MS)
         host.rest = b""  # The reset cut a line.
         host.uart.sent.clear()
@@ -416,9 +416,9 @@ def power_cut_while_writing(rig):
     rig.note(f"{len(cuts)} cuts, {rig.machine.flash.erasures} erasures")
 
 
-def learnt_in_flash(rig):
-    """What is learnt of the wheels is written only after two seconds of silence, comes back after power-off with where it came from, and is
-    forgotten with the setting it was found for."""
+def stored_in_flash(rig):
+    """The board stores observations of the wheels only after two seconds without setpoints, restores them with their provenance after
+    power-off, and drops them with the setting for which they were found."""
     host, flash = start(rig), rig.machine.flash
     assert host.ask(1, {"cmd": "status"})["memory"] == {"file": "flash", "state": "new", "reason": None}
     host.ask(1, {"cmd": "watch", "topics": ["force"], "rate_hz": 1})
@@ -437,8 +437,8 @@ def learnt_in_flash(rig):
     rig.run(2 * SECOND)  # A tare wants two quiet seconds.
     tared = host.ask(1, {"cmd": "tare", "side": "left"})["left"]["offset_mN"]
     rig.run(20 * MS)
-    told = host.events("offset")
-    assert told and (told[-1]["side"], told[-1]["provenance"], told[-1]["offset_mN"]) == ("left", "operator", tared), told
+    reported = host.events("offset")
+    assert reported and (reported[-1]["side"], reported[-1]["provenance"], reported[-1]["offset_mN"]) == ("left", "operator", tared), reported
     rig.run(2300 * MS)
     now = flash.operations
     rig.run(5 * SECOND)
@@ -463,7 +463,7 @@ def learnt_in_flash(rig):
 
 
 def power_cut_while_learning(rig):
-    """Power fails after any number of words of what is learnt: it is the old or the new one, and the configuration stays."""
+    """Power fails after any number of stored words: the board restores the old or the new record, and retains the configuration."""
     host, says, known = start(rig), True, "assumed"
     host.ask(1, {"cmd": "config", "key": "drive.lease_ms", "value": 250})
     host.ask(1, {"cmd": "config", "commit": True})
@@ -483,12 +483,12 @@ def power_cut_while_learning(rig):
         assert after in (known, "confirmed" if says else "contradicted"), f"{known} became {after}"
         known = after
     rig.expect_resets(*(cause for _, cause in rig.machine.resets))
-    assert known != "assumed", "nothing was ever kept"
+    assert known != "assumed", "nothing was ever stored"
     rig.note(f"{len(cuts)} cuts, {rig.machine.flash.erasures} erasures")
 
 
 def bus_off_driven(rig):
-    """Bus-off under a host: latched, told, and nothing moves when the bus is back."""
+    """Bus-off with a host: the board latches and reports it, and nothing moves when the bus is back."""
     host = start_driving(rig)
     host.ask(1, {"cmd": "watch", "topics": ["stop", "bus"]})
     rig.machine.bus.corrupt_chip = True
@@ -527,24 +527,24 @@ def hostile_line(rig):
     host, chance = start(rig), random.Random(4)
     host.arm()
     host.keep_driving(SPEED, 200)
-    kept, begun_ns = [], rig.machine.now_ns
+    captured, begun_ns = [], rig.machine.now_ns
     good = None
     count = 0
     for _ in range(60):
         for _ in range(12):
             good = framed(b"1 " + host.quoted(1, {"cmd": "drive", "left_mm_s": 777, "right_mm_s": 777})) + b"\n"
-            kept.append(good)
+            captured.append(good)
             bad = damaged(chance, good)
             host.raw(bad if bad.rstrip(b"\n") != good.rstrip(b"\n") else b"\n")
             count += 1
         rig.run(20 * MS)
     assert not [frame for frame in rig.setpoints() if frame.setpoint()[0] > SPEED], "a damaged line was obeyed"
-    assert not moving(rig, begun_ns + LEASE_NS + PERIOD_NS + RAMP_NS), "damaged lines kept the lease"
-    told = host.events("line_error")
-    assert told and len(told) <= 2 + 5 * (rig.machine.now_ns - begun_ns) / SECOND, f"{len(told)} line_errors"
+    assert not moving(rig, begun_ns + LEASE_NS + PERIOD_NS + RAMP_NS), "damaged lines extended the lease"
+    reported = host.events("line_error")
+    assert reported and len(reported) <= 2 + 5 * (rig.machine.now_ns - begun_ns) / SECOND, f"{len(reported)} line_errors"
     assert host.ask(1, {"cmd": "hello"}, 500)["ok"], "the line did not recover"
     host.arm()
-    for line in kept[::9]:
+    for line in captured[::9]:
         host.raw(line)
         count += 1
         rig.run(5 * MS)
@@ -555,7 +555,7 @@ def hostile_line(rig):
         host.raw(fresh)
         count += 1
         rig.run(10 * MS)
-    assert not moving(rig, rig.machine.now_ns - 100 * MS), "one command, doubled, kept the lease"
+    assert not moving(rig, rig.machine.now_ns - 100 * MS), "one command, doubled, extended the lease"
     rig.note(f"{count} bad lines")
 
 
@@ -595,7 +595,7 @@ def another_rate(rig):
 
 
 def crowd(rig):
-    """Eight clients, all of whom watch and ask without end: the driver goes on, replies come before events, losses are told."""
+    """Eight clients watch and send requests continuously: the driver drives, replies precede events, losses are reported."""
     host = start(rig)
     host.arm()
     for channel in range(2, 9):
@@ -613,7 +613,7 @@ def crowd(rig):
     times = [frame.time_ns for frame in frames if frame.id == LEFT]
     gap_ns = max(b - a for a, b in itertools.pairwise(times))
     assert gap_ns < 30 * MS, f"a gap of {gap_ns / MS:.1f} ms"
-    assert host.events("lost"), "losses were not told"
+    assert host.events("lost"), "losses were not reported"
     served = {line.channel for line in host.lines if line.message.get("id") is not None and "left" in line.message}
     assert served >= set(range(2, 9)), f"only {served} had a snapshot"
     rig.note(f"worst gap between setpoints {gap_ns / MS:.1f} ms")
@@ -635,7 +635,7 @@ SCENARIOS = (
     reset_in_motion,
     config_in_flash,
     power_cut_while_writing,
-    learnt_in_flash,
+    stored_in_flash,
     power_cut_while_learning,
     bus_off_driven,
     hostile_line,

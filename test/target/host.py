@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The host's end of the serial line, for the scenarios of the image `gateway`: a relay that says what it is told to, right or wrong."""
+"""The host's end of the serial line, for the scenarios of the image `gateway`: a relay that sends the given lines, right or wrong."""
 
 import json
 import zlib
@@ -98,7 +98,7 @@ class Host:
         return hello
 
     def begin(self, channel=1):
-        """A relay that comes to a board with both wheels at rest."""
+        """A relay that connects to a board whose wheels are both at standstill."""
         self.rig.run(600 * MS)
         self.say(0, {"cmd": "link"})
         self.wait(lambda line: line.channel == 0 and line.message.get("event") == "link")

@@ -58,7 +58,7 @@ def build_images():
     (WORK / "images").mkdir(parents=True, exist_ok=True)
     for board, several in IMAGES.items():
         for image in several:
-            folder = WORK / board  # One after another: the libraries are the same, the options of the image before are taken back.
+            folder = WORK / board  # One after another: the libraries are the same, the options of the previous image are removed.
             done = configure(folder, CPUS[board], [f"-DIWHEEL_BOARD={board}", *OPTIONS[image]])
             if done.returncode != 0:
                 raise RuntimeError(done.stderr)

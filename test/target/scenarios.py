@@ -115,7 +115,7 @@ def other_crystal(rig):
 
 
 def listening(rig):
-    """Without setpoint type and role: hears everything, sends nothing, does not even acknowledge."""
+    """Without setpoint type and role, the board receives everything, sends nothing and acknowledges nothing."""
     rig.run(2 * SECOND)
     assert not rig.setpoints() and rig.machine.bus.attempts == 0
     assert rig.machine.can.is_silent(), "the controller is not silent"
@@ -134,7 +134,7 @@ def setpoint_role(rig):
 
 
 def clock_input(rig):
-    """A clock signal instead of a crystal: runs from it, exactly; without it the lamp tells, and it arms when it comes."""
+    """A clock signal instead of a crystal: the board runs from it, exactly; without it the lamp shows it; it arms when the signal comes."""
     clocks = rig.machine.clocks
     clocks.is_clock = True
     clocks.set_crystal(False)
@@ -224,7 +224,7 @@ def estop_pulse(rig):
 
 
 def estop_wakes(rig):
-    """Pressed while nothing else would wake the loop for a while: the edge does, and zeros leave at once."""
+    """The button is pressed while nothing else wakes the loop: the edge wakes it, and zeros leave immediately."""
     arm(rig)
     machine = rig.machine
     for _ in range(1000):
@@ -267,7 +267,7 @@ def estop_at_start(rig):
 
 
 def reset_by_button(rig):
-    """Without a host the button resets a latch: refused while pressed, and what follows is arming with zeros. The console tells."""
+    """Without a host the button resets a latch: refused while pressed; then the board arms with zeros. The console reports it."""
     arm(rig)
     pressed_ns = rig.machine.now_ns
     open_estop(rig)
@@ -304,17 +304,17 @@ def reset_while_listening(rig):
 
 
 def console(rig):
-    """The first line tells version, clock, pins, bit timing, e-stop; a line each change; and both again when somebody types."""
+    """The first line has version, clock, pins, bit timing, e-stop; each change has a line; a typed character repeats both."""
     rig.run(1500 * MS)
     machine, lines = rig.machine, rig.console()
-    told = re.fullmatch(
+    printed = re.fullmatch(
         r"iwheel \d+\.\d+\.\d+ on (\w+) \([\w ]+\): clock (\d+) MHz from a crystal of (\d+) kHz; CAN on (?:PB8 PB9|PA11 PA12) at (\d+) bit/s, "
         r"sampled at 62\.5 %, (?:BTR|NBTP) 0x([0-9A-F]{8}); e-stop on PB0: released; holds both wheels at zero",
         lines[0],
     )
-    assert told, lines[0]
+    assert printed, lines[0]
     facts = (machine.board.name.upper(), machine.clocks.core_hz // 10**6, machine.clocks.crystal_hz // 1000, 10**6, machine.can.read(0x1C))
-    assert (told[1], *map(int, told.groups()[1:4]), int(told[5], 16)) == facts, (told.groups(), facts)
+    assert (printed[1], *map(int, printed.groups()[1:4]), int(printed[5], 16)) == facts, (printed.groups(), facts)
     assert lines[-2:] == ["armed; bus active; e-stop released", ""], lines
     machine.uart.send(b"?")
     rig.run(500 * MS)
@@ -353,7 +353,7 @@ def no_acknowledgement(rig):
     rig.machine.bus.acknowledge_chip = False
     rig.run(500 * MS)
     assert rig.machine.bus.attempts > 0 and not rig.setpoints()
-    assert rig.machine.can.is_on(), "bus-off for want of acknowledgements"
+    assert rig.machine.can.is_on(), "bus-off, because nothing acknowledges"
     rig.machine.bus.acknowledge_chip = True
     back_ns = rig.machine.now_ns
     rig.run(SECOND)
@@ -444,7 +444,7 @@ def bus_off(rig):
 
 
 def stuck_at_start(rig):
-    """The bus is held dominant from the start: no hang, the lamp tells, and it arms when the bus is let go."""
+    """The bus is dominant from the start: the board does not hang, the lamp shows it, and it arms when the bus is recessive again."""
     rig.machine.bus.hold_dominant(True)
     rig.run(2 * SECOND)
     assert_lamp(rig, NO_BUS)
@@ -484,12 +484,12 @@ def torn(rig, where, bus_offs):
 
 
 def cable_torn(rig):
-    """In motion the cable is torn off beyond the transceiver: latched, nothing old afterwards, and no motion by itself."""
+    """In motion the cable is torn off beyond the transceiver: latched, nothing old afterwards, and no motion without a new request."""
     torn(rig, "cable", 0)
 
 
 def receiver_open(rig):
-    """In motion the wire of the received signal breaks: bus-off again and again, zeros when it is whole, and no motion by itself."""
+    """In motion the wire of the received signal breaks: bus-off repeatedly, zeros when it is whole, and no motion without a new request."""
     torn(rig, "receiver", 2)
 
 
@@ -523,14 +523,14 @@ def full_bus(rig):
     assert total >= 20_500, f"the bus was not full: {total} frames/s"
     assert rig.machine.can.overruns() == 0 and rig.counter("overruns") == 0, "the controller's FIFO overran"
     assert rig.counter("lost") == 0, f"{rig.counter('lost')} frames were lost"
-    assert rig.counter("bad_format") - before == frames, f"{rig.counter('bad_format') - before} of {frames} frames were taken"
+    assert rig.counter("bad_format") - before == frames, f"{rig.counter('bad_format') - before} of {frames} frames were accepted"
     assert_gaps(rig.setpoints(start_ns), 25 * MS)
     assert_zero(rig.setpoints(start_ns))
     rig.note(f"{total} frames/s")
 
 
 def overrun(rig):
-    """The CPU is held up for 2 ms on a full bus: the controller overruns, the core is told, and nothing else happens."""
+    """The CPU is held up for 2 ms on a full bus: the controller overruns, the core receives it, and nothing else happens."""
     arm(rig)
     rig.machine.bus.flood = Frame(545, b"", sender="flood", remote_dlc=3)
     rig.run(20 * MS)
@@ -541,7 +541,7 @@ def overrun(rig):
     rig.run(20 * MS)
     rig.machine.bus.flood = None
     assert rig.machine.can.overruns() >= 30, "the emulated controller did not overrun"
-    assert rig.counter("overruns") >= 1 and rig.counter("unknown") == before + 1, "the core was not told, or too often"
+    assert rig.counter("overruns") >= 1 and rig.counter("unknown") == before + 1, "the core received no overrun, or too many"
     rig.run(300 * MS)
     assert_lamp_steady_since(rig, 250 * MS)
 
@@ -569,7 +569,7 @@ def second_master(rig):
 
 
 def no_crystal(rig):
-    """No crystal: the bus is left alone, the lamp tells, no reset; when it comes, it arms."""
+    """No crystal: the board sends nothing, the lamp shows it, no reset; when the crystal runs, the board arms."""
     rig.machine.clocks.set_crystal(False)
     rig.run(1200 * MS)
     assert_lamp(rig, NO_CRYSTAL)
@@ -580,14 +580,14 @@ def no_crystal(rig):
 
 
 def slow_crystal(rig):
-    """A crystal that needs 45 ms is waited for, not started anew again and again."""
+    """The board waits for a crystal that needs 45 ms, and does not restart it repeatedly."""
     rig.machine.clocks.start_ns = 45 * MS
     arm(rig)
     assert rig.machine.can.timing() == (1_000_000, 625), rig.machine.can.timing()
 
 
 def crystal_dies(rig):
-    """The crystal fails in motion: off the bus at once; when it comes back zeros first, and no motion by itself."""
+    """The crystal fails in motion: off the bus immediately; when it runs again, zeros first, and no motion without a new request."""
     start_demo(rig)
     died_ns = rig.machine.now_ns
     rig.machine.clocks.set_crystal(False)
@@ -602,7 +602,7 @@ def crystal_dies(rig):
 
 
 def hang(rig):
-    """The CPU hangs in motion: the watchdog, however slow its oscillator, begins anew with zeros."""
+    """The CPU hangs in motion: the watchdog, however slow its oscillator, restarts the board with zeros."""
     start_demo(rig)
     hung_ns = rig.machine.now_ns
     rig.machine.frozen = True
@@ -650,7 +650,7 @@ def reset_after_the_hold(rig):
 
 
 def reset_after_unproven_hold(rig):
-    """A stop that nobody acknowledged is not over for the next run: zeros first, also while the e-stop keeps it from arming."""
+    """A stop without acknowledgement continues in the next run: zeros first, also while the e-stop prevents arming."""
     start_demo(rig)
     machine = rig.machine
     machine.bus.acknowledge_chip = False
@@ -666,7 +666,7 @@ def reset_after_unproven_hold(rig):
 
 
 def stack_overflow(rig):
-    """In motion the stack reaches its end: a fault, not a changed variable; it begins anew with zeros."""
+    """In motion the stack reaches its end: a fault, not a changed variable; the board restarts with zeros."""
     start_demo(rig)
     machine, overflow_ns = rig.machine, rig.machine.now_ns
     while machine.active or not machine.sleeping:
@@ -676,7 +676,7 @@ def stack_overflow(rig):
     rig.expect_resets("software")
     assert machine.faults == 1, "no fault"
     reset_ns = machine.resets[0][0]
-    assert reset_ns - overflow_ns < 10 * MS, "the fault was not noticed at once"
+    assert reset_ns - overflow_ns < 10 * MS, "the fault was not noticed immediately"
     assert rig.setpoints(reset_ns)[0].time_ns - reset_ns < 300 * MS, "no zeros first"
     assert_zero(rig.setpoints(overflow_ns + MS))
 
@@ -696,7 +696,7 @@ def loop_stuck(rig):
 
 
 def stuck_while_listening(rig):
-    """The same before anything was sent: it begins anew, in silence."""
+    """The same before anything was sent: the board restarts and sends nothing."""
     rig.machine.bus.wheels[1].power(False, 0)
     rig.run(500 * MS)
     rig.machine.divert()
@@ -727,7 +727,7 @@ def demo_button_held_through_reset(rig):
 
 
 def demo_profile(rig):
-    """Nothing moves before a press; the profile ends by itself where it began and is not repeated."""
+    """Nothing moves before a press; the profile ends on its own where it began and is not repeated."""
     arm(rig, 1500 * MS)
     press_button(rig)
     rig.run(7500 * MS)
@@ -788,7 +788,7 @@ def demo_estop(rig):
     rig.note(f"edge to zero on the bus at most {worst_ns / MS:.2f} ms")
 
 
-# image -> scenarios; the watchdog's oscillator is nominal, slowest (0) or fastest (1) where given.
+# image -> scenarios; the watchdog's oscillator is nominal, slowest (0) or fastest (1) if stated.
 SCENARIOS = {
     "listen": (listening, reset_while_listening),
     "zero": (
@@ -882,7 +882,7 @@ OF_THE_CONTROLLER = (babbling, overrun, cable_torn, silence_is_silent, abort_wit
 LONG_ON = {"stm32f407": LONG, "stm32g474": tuple(scenario for scenario in LONG if scenario not in OF_THE_CONTROLLER)}
 # image -> of its serial port, where it is not 115200.
 BAUD = {"gateway": host.BAUD, "gateway_slow": 115_200, "gateway_fast": 2_000_000}
-# Of the stack that sections.ld keeps so much stays unused in every scenario.
+# Bytes of the stack reserved in sections.ld that every scenario leaves unused.
 STACK_SPARE = 256
 # image -> what differs around the chip.
 WIRING = {"usb": {"transceiver": "PA11"}, "crystal": {"crystal_hz": 25_000_000}, "crystal12": {"crystal_hz": 12_000_000}}

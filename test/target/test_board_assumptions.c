@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a board stores of its wheels: which values are restored, which are dropped, and what a power cut leaves.
+// Stored observations of the wheels: values that are restored or dropped, and the state after a power cut.
 #include "gateway_rig.h"
 #include "unit.h"
 
@@ -138,24 +138,24 @@ TEST(test_learned_impossible_zero_is_not_restored) {
 }
 
 TEST(test_learned_small_changes_need_no_record) {
-    const brd_assumptions_t kept = something();
-    brd_assumptions_t now = kept;
+    const brd_assumptions_t stored = something();
+    brd_assumptions_t now = stored;
     now.figure[IW_ASSUMPTION_FORCE_UNIT_RIGHT]++;
     now.zero[IW_RIGHT].offset_mN += BRD_ASSUMPTIONS_MOVED_mN;
     now.zero[IW_RIGHT].from = IW_OFFSET_ESTIMATED;
-    TEST_ASSERT_FALSE(brd_assumptions_differs(&now, &kept));
+    TEST_ASSERT_FALSE(brd_assumptions_differs(&now, &stored));
     now.zero[IW_RIGHT].offset_mN++;
-    TEST_ASSERT_TRUE(brd_assumptions_differs(&now, &kept));
-    now = kept;
-    now.zero[IW_LEFT].offset_mN++; // Of a tare, every millinewton counts.
-    TEST_ASSERT_TRUE(brd_assumptions_differs(&now, &kept));
+    TEST_ASSERT_TRUE(brd_assumptions_differs(&now, &stored));
+    now = stored;
+    now.zero[IW_LEFT].offset_mN++; // A tare is stored even if it changes by a millinewton.
+    TEST_ASSERT_TRUE(brd_assumptions_differs(&now, &stored));
 }
 
 static brd_records_t power_on(void) {
-    brd_records_t kept = {.power_ons = 0};
+    brd_records_t stored = {.power_ons = 0};
     cut_after = UINT32_MAX;
-    brd_records_open(&kept, true, false);
-    return kept;
+    brd_records_open(&stored, true, false);
+    return stored;
 }
 
 TEST(test_learned_cut_at_any_word_leaves_the_old_or_new_record) {
@@ -163,22 +163,22 @@ TEST(test_learned_cut_at_any_word_leaves_the_old_or_new_record) {
     brd_assumptions_t learned = something();
     brd_settings_t found;
     brd_assumptions_t read;
-    brd_records_t kept = power_on();
-    TEST_ASSERT_FALSE(brd_records_assumptions(&kept, &read));
-    TEST_ASSERT_TRUE(brd_records_commit(&kept, &settings));
+    brd_records_t stored = power_on();
+    TEST_ASSERT_FALSE(brd_records_assumptions(&stored, &read));
+    TEST_ASSERT_TRUE(brd_records_commit(&stored, &settings));
     learned.zero[IW_LEFT].offset_mN = 0;
-    kept = power_on();
-    TEST_ASSERT_TRUE(brd_records_write_assumptions(&kept, &learned));
+    stored = power_on();
+    TEST_ASSERT_TRUE(brd_records_write_assumptions(&stored, &learned));
     for (unsigned cut = 0; cut <= 64U; cut++) {
-        kept = power_on();
-        TEST_ASSERT_TRUE(brd_records_assumptions(&kept, &read));
+        stored = power_on();
+        TEST_ASSERT_TRUE(brd_records_assumptions(&stored, &read));
         const int32_t before = read.zero[IW_LEFT].offset_mN;
         learned.zero[IW_LEFT].offset_mN = before + 1;
         operations = 0;
         cut_after = cut;
-        const bool done = brd_records_write_assumptions(&kept, &learned);
-        kept = power_on();
-        TEST_ASSERT_TRUE(brd_records_settings(&kept, &found) && brd_records_assumptions(&kept, &read));
+        const bool done = brd_records_write_assumptions(&stored, &learned);
+        stored = power_on();
+        TEST_ASSERT_TRUE(brd_records_settings(&stored, &found) && brd_records_assumptions(&stored, &read));
         TEST_ASSERT_EQUAL_MEMORY(&settings, &found, sizeof found);
         TEST_ASSERT_EQUAL_INT(done ? before + 1 : before, read.zero[IW_LEFT].offset_mN);
         TEST_ASSERT_TRUE_MESSAGE(done == (cut >= 62U), "sequence, payload and CRC are written, and nothing else");
@@ -188,23 +188,23 @@ TEST(test_learned_cut_at_any_word_leaves_the_old_or_new_record) {
 TEST(test_learned_last_blank_slot_is_reserved_for_settings) {
     const brd_settings_t settings = settings_of(NULL, NULL);
     const brd_assumptions_t learned = something();
-    brd_records_t kept = power_on();
-    while (brd_records_write_assumptions(&kept, &learned)) {
+    brd_records_t stored = power_on();
+    while (brd_records_write_assumptions(&stored, &learned)) {
     }
-    TEST_ASSERT_EQUAL_UINT(1, brd_store_blank(&kept.store));
-    TEST_ASSERT_TRUE(brd_records_commit(&kept, &settings));
+    TEST_ASSERT_EQUAL_UINT(1, brd_store_blank(&stored.store));
+    TEST_ASSERT_TRUE(brd_records_commit(&stored, &settings));
     TEST_ASSERT_EQUAL_UINT(0, erasures);
-    const uint32_t power_ons = kept.power_ons;
-    brd_records_open(&kept, false, true); // Wheels may be turning: no slow operation starts.
+    const uint32_t power_ons = stored.power_ons;
+    brd_records_open(&stored, false, true); // Wheels may be turning: no slow operation starts.
     TEST_ASSERT_EQUAL_UINT(0, erasures);
-    brd_records_open(&kept, false, false);
+    brd_records_open(&stored, false, false);
     TEST_ASSERT_EQUAL_UINT(1, erasures);
-    TEST_ASSERT_EQUAL_UINT(3, brd_store_blank(&kept.store));
-    TEST_ASSERT_EQUAL_UINT32(power_ons, kept.power_ons);
+    TEST_ASSERT_EQUAL_UINT(3, brd_store_blank(&stored.store));
+    TEST_ASSERT_EQUAL_UINT32(power_ons, stored.power_ons);
     brd_assumptions_t read;
     brd_settings_t found;
-    TEST_ASSERT_TRUE(brd_records_assumptions(&kept, &read) && brd_records_settings(&kept, &found));
-    brd_records_open(&kept, false, false);
+    TEST_ASSERT_TRUE(brd_records_assumptions(&stored, &read) && brd_records_settings(&stored, &found));
+    brd_records_open(&stored, false, false);
     TEST_ASSERT_EQUAL_UINT_MESSAGE(1, erasures, "each start would erase");
 }
 
@@ -244,7 +244,7 @@ static void put_as_before(uint8_t *place, const brd_settings_t *settings) {
 }
 
 /// Writes the layout of version 0.2: settings, a flag for learned values, and these values.
-static void write_as_before(brd_records_t *kept, const brd_settings_t *settings, const brd_assumptions_t *learned) {
+static void write_as_before(brd_records_t *stored, const brd_settings_t *settings, const brd_assumptions_t *learned) {
     uint32_t words[BRD_STORE_WORDS] = {7U, (settings != NULL) ? 1U : 0U};
     uint8_t *const rest = (uint8_t *)&words[2];
     if (settings != NULL) {
@@ -255,7 +255,7 @@ static void write_as_before(brd_records_t *kept, const brd_settings_t *settings,
         put_as_before(rest + 56U, &learned->settings);
         memcpy(rest + 108U, learned->zero, sizeof *learned - offsetof(brd_assumptions_t, zero));
     }
-    TEST_ASSERT_TRUE(brd_store_write(&kept->store, words, false));
+    TEST_ASSERT_TRUE(brd_store_write(&stored->store, words, false));
 }
 
 TEST(test_learned_record_of_version_0_2_is_read_with_defaults) {
@@ -263,13 +263,13 @@ TEST(test_learned_record_of_version_0_2_is_read_with_defaults) {
     brd_assumptions_t learned = something();
     brd_settings_t found;
     brd_assumptions_t read;
-    brd_records_t kept = power_on();
-    write_as_before(&kept, &settings, &learned);
+    brd_records_t stored = power_on();
+    write_as_before(&stored, &settings, &learned);
     // The second start reads what the first start has written in the new layout.
     for (unsigned start = 0; start < 2U; start++) {
-        kept = power_on();
-        TEST_ASSERT_EQUAL_UINT32(8U + start, kept.power_ons);
-        TEST_ASSERT_TRUE(brd_records_settings(&kept, &found) && brd_records_assumptions(&kept, &read));
+        stored = power_on();
+        TEST_ASSERT_EQUAL_UINT32(8U + start, stored.power_ons);
+        TEST_ASSERT_TRUE(brd_records_settings(&stored, &found) && brd_records_assumptions(&stored, &read));
         TEST_ASSERT_EQUAL_MEMORY(&settings, &found, sizeof found);
         TEST_ASSERT_EQUAL_MEMORY(&learned.settings, &read.settings, sizeof read.settings);
         TEST_ASSERT_EQUAL_MEMORY(learned.zero, read.zero, sizeof read - offsetof(brd_assumptions_t, zero));
@@ -279,11 +279,11 @@ TEST(test_learned_record_of_version_0_2_is_read_with_defaults) {
 TEST(test_learned_record_of_version_0_2_without_settings_is_empty) {
     brd_settings_t found;
     brd_assumptions_t read;
-    brd_records_t kept = power_on();
-    write_as_before(&kept, NULL, NULL);
-    kept = power_on();
-    TEST_ASSERT_FALSE(brd_records_settings(&kept, &found));
-    TEST_ASSERT_FALSE(brd_records_assumptions(&kept, &read));
+    brd_records_t stored = power_on();
+    write_as_before(&stored, NULL, NULL);
+    stored = power_on();
+    TEST_ASSERT_FALSE(brd_records_settings(&stored, &found));
+    TEST_ASSERT_FALSE(brd_records_assumptions(&stored, &read));
 }
 
 /// A command that was stored before a power loss quotes another number of starts.

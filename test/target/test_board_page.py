@@ -34,8 +34,8 @@ def facts(board, *options):
         subprocess.run(
             ["gcc", "-xc", "-", "-o", f"{folder}/probe", *options, f"-I{STM32}", f"-I{STM32 / 'boards' / board}"], input=program, text=True, check=True
         )
-        told = subprocess.run([f"{folder}/probe"], capture_output=True, text=True, check=True).stdout
-    return dict(zip(values, map(int, told.split()), strict=True))
+        printed = subprocess.run([f"{folder}/probe"], capture_output=True, text=True, check=True).stdout
+    return dict(zip(values, map(int, printed.split()), strict=True))
 
 
 def pin(number):

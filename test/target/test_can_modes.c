@@ -105,13 +105,13 @@ TEST(test_bus_unexpected_initialisation_mode_is_left) {
 
 TEST(test_bus_silent_device_only_receives) {
     const iw_can_frame_t frame = rig_frame(266, 1);
-    iw_can_frame_t heard;
+    iw_can_frame_t first_frame;
     rig_init(0, true);
     (void)state();
     can_model_recessive(model, 11);
     TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, state());
     TEST_ASSERT_FALSE(rig_hear(0, 256, 4));
-    TEST_ASSERT_EQUAL(1, can_receive(driver, &heard));
+    TEST_ASSERT_EQUAL(1, can_receive(driver, &first_frame));
     TEST_ASSERT_LESS_THAN(0, can_send(driver, &frame, 1));
 }
 
@@ -242,7 +242,7 @@ TEST(test_bus_error_passive_is_reported) {
 TEST(test_bus_receive_errors_are_reported) {
     rig_start(0);
     for (int i = 0; i < 130; i++) {
-        can_model_hear_error(model);
+        can_model_receive_error(model);
     }
     TEST_ASSERT_GREATER_THAN(127, rig_read_rec(0));
     rig_assert_lec(0, 1);
@@ -252,7 +252,7 @@ TEST(test_bus_receive_errors_are_reported) {
 TEST(test_bus_error_interrupt_wakes_and_ends) {
     rig_start(0);
     for (int i = 0; i < 128; i++) {
-        can_model_hear_error(model);
+        can_model_receive_error(model);
     }
     TEST_ASSERT_TRUE(can_model_irq_error(model));
     (void)state();
@@ -263,7 +263,7 @@ TEST(test_bus_error_interrupt_wakes_and_ends) {
 TEST(test_bus_two_devices_share_only_their_filters) {
     const iw_can_frame_t frame = rig_frame(266, 7);
     model_frame_t on_bus;
-    iw_can_frame_t heard;
+    iw_can_frame_t first_frame;
     rig_start(0);
     rig_start(1);
 #ifndef IWHEEL_RIG_FDCAN
@@ -273,9 +273,9 @@ TEST(test_bus_two_devices_share_only_their_filters) {
     TEST_ASSERT_EQUAL(1, can_send(&rig[1].driver, &frame, 1));
     TEST_ASSERT_FALSE(rig_send_next(0, &on_bus));
     TEST_ASSERT_TRUE(rig_send_next(1, &on_bus));
-    TEST_ASSERT_EQUAL(0, can_receive(&rig[0].driver, &heard));
-    TEST_ASSERT_EQUAL(1, can_receive(&rig[1].driver, &heard));
-    TEST_ASSERT_EQUAL(IW_CAN_ECHO, heard.kind);
+    TEST_ASSERT_EQUAL(0, can_receive(&rig[0].driver, &first_frame));
+    TEST_ASSERT_EQUAL(1, can_receive(&rig[1].driver, &first_frame));
+    TEST_ASSERT_EQUAL(IW_CAN_ECHO, first_frame.kind);
 }
 
 static bool in_use_reads_back(uint32_t id) {
@@ -290,7 +290,7 @@ TEST(test_bus_off_of_one_device_does_not_affect_the_other) {
     can_driver_t *const other = &rig[1].driver;
     const iw_can_frame_t frame = rig_frame(298, 7);
     model_frame_t on_bus;
-    iw_can_frame_t taken;
+    iw_can_frame_t received;
     rig_start(0);
     rig_start(1);
     TEST_ASSERT_EQUAL(1, can_send(other, &frame, 1));
@@ -303,7 +303,7 @@ TEST(test_bus_off_of_one_device_does_not_affect_the_other) {
     TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, state());
     TEST_ASSERT_TRUE(in_use_reads_back(266));
     TEST_ASSERT_TRUE(rig_hear(0, 256, 4));
-    TEST_ASSERT_EQUAL(1, can_receive(driver, &taken));
+    TEST_ASSERT_EQUAL(1, can_receive(driver, &received));
     TEST_ASSERT_EQUAL(0, driver->bus_offs);
     TEST_ASSERT_EQUAL(1, other->bus_offs);
     (void)can_bus_state(other);

@@ -33,7 +33,7 @@ static bool is_ours(uint32_t id) {
 
 /// Returns 1 if the frame passes the filters, with the received frame in `*out_frame`.
 static int pass(const model_frame_t *frame, iw_can_frame_t *out_frame) {
-    (void)can_model_hear(model, frame);
+    (void)can_model_receive(model, frame);
     rig_serve(0);
     return can_receive(driver, out_frame);
 }
@@ -42,11 +42,11 @@ TEST(test_filters_exactly_11_of_all_2048_standard_ids_pass) {
     for (uint32_t id = 0; id < 2048U; id++) {
         for (uint8_t remote = 0; remote <= 1; remote++) {
             const model_frame_t frame = {.id = id, .remote = remote, .dlc = 4};
-            iw_can_frame_t taken;
+            iw_can_frame_t received;
             TEST_ASSERT_EQUAL_MESSAGE(iw_codec_find(id) != NULL, is_ours(id), "the core's table has other ids");
-            TEST_ASSERT_EQUAL_MESSAGE(is_ours(id) ? 1 : 0, pass(&frame, &taken), "an id is filtered wrongly");
+            TEST_ASSERT_EQUAL_MESSAGE(is_ours(id) ? 1 : 0, pass(&frame, &received), "an id is filtered wrongly");
             if (is_ours(id)) {
-                TEST_ASSERT_EQUAL_HEX32(id | ((remote != 0U) ? IW_CAN_REMOTE : 0U), taken.id);
+                TEST_ASSERT_EQUAL_HEX32(id | ((remote != 0U) ? IW_CAN_REMOTE : 0U), received.id);
             }
         }
     }
@@ -56,10 +56,10 @@ TEST(test_filters_extended_ids_pass_only_with_the_same_number) {
     for (uint32_t bit = 0; bit < 29U; bit++) {
         for (uint32_t id = 0; id < 2048U; id++) {
             const model_frame_t frame = {.id = id ^ (1U << bit), .extended = 1, .dlc = 4};
-            iw_can_frame_t taken;
-            TEST_ASSERT_EQUAL(is_ours(frame.id) ? 1 : 0, pass(&frame, &taken));
+            iw_can_frame_t received;
+            TEST_ASSERT_EQUAL(is_ours(frame.id) ? 1 : 0, pass(&frame, &received));
             if (is_ours(frame.id)) {
-                TEST_ASSERT_EQUAL_HEX32(frame.id | IW_CAN_EXTENDED, taken.id);
+                TEST_ASSERT_EQUAL_HEX32(frame.id | IW_CAN_EXTENDED, received.id);
             }
         }
     }
@@ -68,84 +68,84 @@ TEST(test_filters_extended_ids_pass_only_with_the_same_number) {
 TEST(test_filters_extended_id_with_the_same_prefix_does_not_pass) {
     for (size_t i = 0; i < sizeof ours / sizeof ours[0]; i++) {
         const model_frame_t frame = {.id = ours[i] << 18, .extended = 1, .dlc = 4};
-        iw_can_frame_t taken;
-        TEST_ASSERT_EQUAL(0, pass(&frame, &taken));
+        iw_can_frame_t received;
+        TEST_ASSERT_EQUAL(0, pass(&frame, &received));
     }
 }
 
 TEST(test_received_frame_has_the_same_bytes) {
     const model_frame_t frame = {.id = 290, .dlc = 8, .data = {0x81, 0x02, 0xF3, 0x04, 0x95, 0x06, 0xA7, 0x08}};
-    iw_can_frame_t taken;
-    memset(&taken, 0xA5, sizeof taken);
-    TEST_ASSERT_EQUAL(1, pass(&frame, &taken));
-    TEST_ASSERT_EQUAL(290, taken.id);
-    TEST_ASSERT_EQUAL(8, taken.dlc);
-    TEST_ASSERT_EQUAL(IW_CAN_RECEIVED, taken.kind);
-    TEST_ASSERT_EQUAL_HEX8_ARRAY(frame.data, taken.data, 8);
+    iw_can_frame_t received;
+    memset(&received, 0xA5, sizeof received);
+    TEST_ASSERT_EQUAL(1, pass(&frame, &received));
+    TEST_ASSERT_EQUAL(290, received.id);
+    TEST_ASSERT_EQUAL(8, received.dlc);
+    TEST_ASSERT_EQUAL(IW_CAN_RECEIVED, received.kind);
+    TEST_ASSERT_EQUAL_HEX8_ARRAY(frame.data, received.data, 8);
 }
 
 TEST(test_received_dlc_above_8_means_8_bytes) {
     const model_frame_t frame = {.id = 256, .dlc = 15};
-    iw_can_frame_t taken;
-    TEST_ASSERT_EQUAL(1, pass(&frame, &taken));
-    TEST_ASSERT_EQUAL(8, taken.dlc);
+    iw_can_frame_t received;
+    TEST_ASSERT_EQUAL(1, pass(&frame, &received));
+    TEST_ASSERT_EQUAL(8, received.dlc);
 }
 
 TEST(test_received_frames_and_echoes_are_in_the_order_of_the_bus) {
     const iw_can_frame_t left = rig_frame(266, 9);
     const uint32_t expected[] = {256, 266, 512, 288};
     model_frame_t on_bus;
-    iw_can_frame_t taken;
+    iw_can_frame_t received;
     (void)can_send(driver, &left, 1);
     (void)rig_hear(0, 256, 4);
     (void)rig_send_next(0, &on_bus);
     (void)rig_hear(0, 512, 4);
     (void)rig_hear(0, 288, 4);
     for (size_t i = 0; i < 4; i++) {
-        TEST_ASSERT_EQUAL(1, can_receive(driver, &taken));
-        TEST_ASSERT_EQUAL(expected[i], taken.id);
+        TEST_ASSERT_EQUAL(1, can_receive(driver, &received));
+        TEST_ASSERT_EQUAL(expected[i], received.id);
     }
-    TEST_ASSERT_EQUAL(0, can_receive(driver, &taken));
+    TEST_ASSERT_EQUAL(0, can_receive(driver, &received));
 }
 
 TEST(test_received_foreign_setpoint_is_no_echo) {
-    iw_can_frame_t taken;
+    iw_can_frame_t received;
     (void)rig_hear(0, 266, 5);
-    TEST_ASSERT_EQUAL(1, can_receive(driver, &taken));
-    TEST_ASSERT_EQUAL(IW_CAN_RECEIVED, taken.kind);
+    TEST_ASSERT_EQUAL(1, can_receive(driver, &received));
+    TEST_ASSERT_EQUAL(IW_CAN_RECEIVED, received.kind);
 }
 
 #ifndef IWHEEL_RIG_FDCAN
 TEST(test_received_frame_with_a_slow_release_is_not_doubled) {
-    iw_can_frame_t taken;
+    iw_can_frame_t received;
     model->release_slow = 4;
     for (uint8_t i = 0; i < 3; i++) {
         const model_frame_t frame = {.id = 256, .dlc = 1, .data = {i}};
-        (void)can_model_hear(model, &frame);
+        (void)can_model_receive(model, &frame);
     }
     rig_serve(0);
     for (uint8_t i = 0; i < 3; i++) {
-        TEST_ASSERT_EQUAL(1, can_receive(driver, &taken));
-        TEST_ASSERT_EQUAL(i, taken.data[0]);
+        TEST_ASSERT_EQUAL(1, can_receive(driver, &received));
+        TEST_ASSERT_EQUAL(i, received.data[0]);
     }
-    TEST_ASSERT_EQUAL(0, can_receive(driver, &taken));
+    TEST_ASSERT_EQUAL(0, can_receive(driver, &received));
 }
 #endif
 
 static void assert_loss_is_told(void) {
-    iw_can_frame_t taken;
-    memset(&taken, 0xA5, sizeof taken);
-    TEST_ASSERT_EQUAL(1, can_receive(driver, &taken));
-    TEST_ASSERT_EQUAL_HEX32(IW_CAN_ERROR, taken.id);
-    TEST_ASSERT_EQUAL(IW_CAN_RECEIVED, taken.kind);
-    TEST_ASSERT_EQUAL(0, taken.dlc);
+    iw_can_frame_t received;
+    memset(&received, 0xA5, sizeof received);
+    TEST_ASSERT_EQUAL(1, can_receive(driver, &received));
+    TEST_ASSERT_EQUAL_HEX32(IW_CAN_ERROR, received.id);
+    TEST_ASSERT_EQUAL(IW_CAN_RECEIVED, received.kind);
+    TEST_ASSERT_EQUAL(0, received.dlc);
 }
 
 /// Interrupts are disabled for five frames.
 static void overrun(void) {
     const model_frame_t frame = {.id = 256, .dlc = 4};
     for (int i = 0; i < 5; i++) {
-        (void)can_model_hear(model, &frame);
+        (void)can_model_receive(model, &frame);
     }
     rig_serve(0);
 }
@@ -158,44 +158,44 @@ TEST(test_overrun_of_the_controller_is_counted_once) {
 }
 
 TEST(test_overrun_is_reported_once_and_before_its_frames) {
-    iw_can_frame_t taken;
+    iw_can_frame_t received;
     for (int round = 0; round < 2; round++) {
         overrun();
         assert_loss_is_told();
         for (int i = 0; i < 3; i++) {
-            TEST_ASSERT_EQUAL(1, can_receive(driver, &taken));
-            TEST_ASSERT_EQUAL(256, taken.id);
+            TEST_ASSERT_EQUAL(1, can_receive(driver, &received));
+            TEST_ASSERT_EQUAL(256, received.id);
         }
-        TEST_ASSERT_EQUAL(0, can_receive(driver, &taken));
+        TEST_ASSERT_EQUAL(0, can_receive(driver, &received));
     }
 }
 
 TEST(test_full_ring_drops_and_counts_the_newest) {
-    iw_can_frame_t taken;
+    iw_can_frame_t received;
     for (uint32_t i = 0; i < BRD_FRAME_RING_LENGTH + 5U; i++) {
         const model_frame_t frame = {.id = 256, .dlc = 1, .data = {(uint8_t)i}};
-        (void)can_model_hear(model, &frame);
+        (void)can_model_receive(model, &frame);
         rig_serve(0);
     }
     TEST_ASSERT_EQUAL(5, driver->lost);
     assert_loss_is_told();
     for (uint32_t i = 0; i < BRD_FRAME_RING_LENGTH; i++) {
-        TEST_ASSERT_EQUAL(1, can_receive(driver, &taken));
-        TEST_ASSERT_EQUAL(i, taken.data[0]);
+        TEST_ASSERT_EQUAL(1, can_receive(driver, &received));
+        TEST_ASSERT_EQUAL(i, received.data[0]);
     }
-    TEST_ASSERT_EQUAL(0, can_receive(driver, &taken));
+    TEST_ASSERT_EQUAL(0, can_receive(driver, &received));
     (void)rig_hear(0, 257, 7);
-    TEST_ASSERT_EQUAL(1, can_receive(driver, &taken));
+    TEST_ASSERT_EQUAL(1, can_receive(driver, &received));
 }
 
 TEST(test_ring_continues_after_the_overflow_of_its_indices) {
-    iw_can_frame_t taken;
+    iw_can_frame_t received;
     atomic_store(&driver->ring.head, UINT32_MAX - 20U);
     atomic_store(&driver->ring.tail, UINT32_MAX - 20U);
     for (uint32_t i = 0; i < 100U; i++) {
         const model_frame_t frame = {.id = 256, .dlc = 1, .data = {(uint8_t)i}};
-        TEST_ASSERT_EQUAL(1, pass(&frame, &taken));
-        TEST_ASSERT_EQUAL(i, taken.data[0]);
+        TEST_ASSERT_EQUAL(1, pass(&frame, &received));
+        TEST_ASSERT_EQUAL(i, received.data[0]);
     }
     TEST_ASSERT_EQUAL(0, driver->lost);
 }
@@ -209,8 +209,8 @@ TEST(test_filters_do_not_depend_on_earlier_values) {
     rig_start(0);
     for (size_t i = 0; i < sizeof ours / sizeof ours[0]; i++) {
         const model_frame_t frame = {.id = ours[i], .dlc = 4};
-        iw_can_frame_t taken;
-        TEST_ASSERT_EQUAL(1, pass(&frame, &taken));
+        iw_can_frame_t received;
+        TEST_ASSERT_EQUAL(1, pass(&frame, &received));
     }
     TEST_ASSERT_EQUAL_HEX32(0x0FFFFFC0U, model->fm1r);
     TEST_ASSERT_EQUAL_HEX32(0x0FFFFFC0U, model->ffa1r);
@@ -241,7 +241,7 @@ TEST(test_filters_fit_a_controller_with_14_banks) {
 
 TEST(test_receive_error_counter_decreases_again) {
     for (int i = 0; i < 10; i++) {
-        can_model_hear_error(model);
+        can_model_receive_error(model);
     }
     for (int i = 0; i < 4; i++) {
         (void)rig_hear(0, 256, 4);

@@ -43,13 +43,13 @@ def test_second_program_on_serial_port_receives_answers():
     process = emulate("stm32f407", "--image", "listen")
     name = re.search(r"/dev/\S+(?=;)", process.stdout.readline())
     terminal = os.open(name[0], os.O_RDWR | os.O_NOCTTY)
-    heard, again = os.read(terminal, 1), b""
-    while not heard.endswith(b"listening; bus active; e-stop released\r\n"):
-        heard += os.read(terminal, 4096)
+    received, again = os.read(terminal, 1), b""
+    while not received.endswith(b"listening; bus active; e-stop released\r\n"):
+        received += os.read(terminal, 4096)
     os.write(terminal, b"?")
     while again.count(b"\r\n") < 2:
         again += os.read(terminal, 4096)
     process.communicate("quit\n", timeout=3000)
     os.close(terminal)
-    first = heard.split(b"\r\n")[0]
-    assert first.startswith(b"iwheel ") and again.startswith(first) and process.returncode == 0, (heard, again)
+    first = received.split(b"\r\n")[0]
+    assert first.startswith(b"iwheel ") and again.startswith(first) and process.returncode == 0, (received, again)

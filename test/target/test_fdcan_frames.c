@@ -40,12 +40,12 @@ TEST(test_fd_frame_to_send_is_refused) {
 }
 
 TEST(test_fd_frame_of_another_node_is_not_destroyed) {
-    TEST_ASSERT_FALSE(fdcan_model_hear_fd(model));
+    TEST_ASSERT_FALSE(fdcan_model_receive_fd(model));
     TEST_ASSERT_EQUAL(0, model->rec);
 }
 
 TEST(test_fd_frame_of_another_node_is_reported_once) {
-    (void)fdcan_model_hear_fd(model);
+    (void)fdcan_model_receive_fd(model);
     TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, can_bus_state(driver));
     TEST_ASSERT_EQUAL(1, driver->exceptions);
     assert_loss_is_reported();
@@ -55,7 +55,7 @@ TEST(test_fd_frame_of_another_node_is_reported_once) {
 
 /// The read of PSR in `send` clears the flag, too.
 TEST(test_fd_frame_before_a_send_is_counted) {
-    (void)fdcan_model_hear_fd(model);
+    (void)fdcan_model_receive_fd(model);
     TEST_ASSERT_EQUAL(1, send(266, 1));
     (void)can_bus_state(driver);
     TEST_ASSERT_EQUAL(1, driver->exceptions);
@@ -64,7 +64,7 @@ TEST(test_fd_frame_before_a_send_is_counted) {
 TEST(test_stored_fd_frame_is_no_classic_frame) {
     const model_frame_t frame = {.id = 266, .dlc = 5};
     iw_can_frame_t taken;
-    (void)can_model_hear(model, &frame);
+    (void)can_model_receive(model, &frame);
     model->ram[44U + 1U] |= BRD_ELEMENT_FDF;
     rig_serve(0);
     TEST_ASSERT_EQUAL(1, can_receive(driver, &taken));
@@ -180,7 +180,7 @@ TEST(test_full_fifo_retains_the_older_frames) {
     iw_can_frame_t taken;
     for (uint8_t i = 0; i < 4; i++) {
         const model_frame_t frame = {.id = 256, .dlc = 1, .data = {i}};
-        (void)can_model_hear(model, &frame);
+        (void)can_model_receive(model, &frame);
     }
     rig_serve(0);
     TEST_ASSERT_EQUAL(1, can_receive(driver, &taken));

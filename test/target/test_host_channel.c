@@ -99,11 +99,11 @@ TEST(test_channel_with_two_lines_executes_one_per_call) {
     say(1, "{\"cmd\":\"hello\",\"id\":1}");
     say(1, "{\"cmd\":\"hello\",\"id\":2}");
     answer[0] = '\0';
-    TEST_ASSERT_TRUE(brd_host_take(&host, rig.now_us));
+    TEST_ASSERT_TRUE(brd_host_receive(&host, rig.now_us));
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(answer, "\"id\":1"), answer);
-    TEST_ASSERT_TRUE(brd_host_take(&host, rig.now_us));
+    TEST_ASSERT_TRUE(brd_host_receive(&host, rig.now_us));
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(answer, "\"id\":2"), answer);
-    TEST_ASSERT_FALSE(brd_host_take(&host, rig.now_us));
+    TEST_ASSERT_FALSE(brd_host_receive(&host, rig.now_us));
 }
 
 TEST(test_channel_that_only_watches_may_not_arm) {

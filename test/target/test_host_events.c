@@ -303,7 +303,7 @@ TEST(test_host_line_is_stamped_every_second_while_disarmed) {
     pass(3000);
     TEST_ASSERT_EQUAL_UINT(3, count_of("\"event\":\"link\""));
     const iw_snapshot_t seen = gateway_rig_look(&rig);
-    TEST_ASSERT_EQUAL_UINT64(host.linked_us + 1000000U, brd_host_tell(&host, &seen, false));
+    TEST_ASSERT_EQUAL_UINT64(host.linked_us + 1000000U, brd_host_report(&host, &seen, false));
 }
 
 TEST(test_host_hello_and_force_are_complete) {

@@ -54,7 +54,7 @@ static size_t damage(char *line, size_t length) {
 
 /// Sends a hostile line: damaged, or complete and old, doubled, of another start, or without a quote.
 static void put_hostile(void) {
-    static char kept[64][IWN_LINE_BOARD_MAX];
+    static char captured[64][IWN_LINE_BOARD_MAX];
     static size_t stored_length[64];
     char line[IWN_LINE_BOARD_MAX + 16U];
     char good[IWN_LINE_BOARD_MAX];
@@ -72,7 +72,7 @@ static void put_hostile(void) {
         break;
     case 3: // One of the stored lines, later.
         length = stored_length[slot];
-        memcpy(line, kept[slot], length);
+        memcpy(line, captured[slot], length);
         break;
     default:
         memcpy(line, good, length);
@@ -83,7 +83,7 @@ static void put_hostile(void) {
         break;
     }
     stored_length[slot] = (length <= IWN_LINE_BOARD_MAX) ? length : 0U;
-    memcpy(kept[slot], line, stored_length[slot]);
+    memcpy(captured[slot], line, stored_length[slot]);
     put(line, length);
     put("\n", random_below(2)); // Some lines continue into the next line.
 }
@@ -103,7 +103,7 @@ TEST(test_host_line_of_a_million_hostile_lines_none_is_executed) {
         }
         run_ms(20);
         if (turn % 64U == 63U) {
-            TEST_ASSERT_EQUAL_INT_MESSAGE(0, rig.bus.commanded_mm_s[IW_LEFT], "hostile lines kept the lease");
+            TEST_ASSERT_EQUAL_INT_MESSAGE(0, rig.bus.commanded_mm_s[IW_LEFT], "hostile lines extended the lease");
             run_ms(2500);
             say(0, "{\"cmd\":\"link\"}"); // After this time without a relay its channels are closed.
             say(0, "{\"cmd\":\"open\",\"channel\":1,\"watch\":false}");
@@ -153,7 +153,7 @@ TEST(test_host_replies_have_the_id_and_the_result) {
     assert_answer("{\"cmd\":\"recordings\",\"id\":4}", "\"error\":\"denied\"");
     say(0, "{\"cmd\":\"link\"}");
     run_ms(10);
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(heard, "\"event\":\"link\",\"boot\":\"0123456789abcdef\","), heard);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(last_line, "\"event\":\"link\",\"boot\":\"0123456789abcdef\","), last_line);
 }
 
 TEST(test_host_reply_to_arm_is_sent_when_armed) {
@@ -172,7 +172,7 @@ TEST(test_host_reply_to_arm_is_sent_when_armed) {
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(answer, "\"state\":\"armed\""), answer);
 }
 
-/// Keeps the link alive while time passes.
+/// Maintains the link while time passes.
 static void wait_ms(uint32_t span_ms) {
     for (uint32_t ms = 0; ms < span_ms; ms += 100U) {
         say(0, "{\"cmd\":\"alive\"}");

@@ -74,9 +74,9 @@ TEST(test_host_config_read_stays_staged_and_flash_errors_show) {
     assert_answer("{\"cmd\":\"config\",\"key\":\"wheels.track_mm\",\"value\":541,\"id\":1}", "\"staged\":true");
     assert_answer("{\"cmd\":\"config\",\"id\":2}", "\"staged\":true");
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(answer, "\"key\":\"wheels.current_role\",\"value\":\"limit\""), answer);
-    keep_fails = true;
+    settings_fail = true;
     assert_answer("{\"cmd\":\"config\",\"commit\":true,\"id\":3}", "the flash did not accept it");
-    keep_fails = false;
+    settings_fail = false;
     TEST_ASSERT_EQUAL_UINT64(0, host.restart_us);
     assert_answer("{\"cmd\":\"config\",\"commit\":false,\"id\":4}", "\"staged\":false");
 }
@@ -86,7 +86,7 @@ TEST(test_host_replies_of_closed_clients_use_no_place) {
         say(0, "{\"cmd\":\"open\",\"channel\":2,\"watch\":true}");
         say(2, "{\"cmd\":\"status\",\"id\":50}");
         say(0, "{\"cmd\":\"close\",\"channel\":2}");
-        while (brd_host_take(&host, rig.now_us)) {
+        while (brd_host_receive(&host, rig.now_us)) {
         }
         wire_length = wire_taken = 0;
     }
@@ -131,8 +131,8 @@ TEST(test_host_reports_the_button_and_returns_the_next_event_time) {
     say(1, "{\"cmd\":\"watch\",\"topics\":[\"state\"],\"rate_hz\":10}");
     run_ms(20);
     const iw_snapshot_t seen = gateway_rig_look(&rig);
-    const iw_time_us_t next_us = brd_host_tell(&host, &seen, true);
-    TEST_ASSERT_EQUAL_INT(1, host.server.told.estop);
+    const iw_time_us_t next_us = brd_host_report(&host, &seen, true);
+    TEST_ASSERT_EQUAL_INT(1, host.server.reported.estop);
     TEST_ASSERT_EQUAL_UINT64(host.client[0].served.next_us, next_us);
     TEST_ASSERT_TRUE(next_us > rig.now_us && next_us < host.linked_us + 1000000U);
 }

@@ -98,10 +98,10 @@ TEST(test_host_link_line_is_sent_exactly_after_a_second) {
     iw_snapshot_t seen = gateway_rig_look(&rig);
     forget();
     seen.at_us = host.linked_us + BRD_HOST_LINK_US - 1U;
-    (void)brd_host_tell(&host, &seen, false);
+    (void)brd_host_report(&host, &seen, false);
     TEST_ASSERT_NULL_MESSAGE(strstr(all, "\"event\":\"link\""), all);
     seen.at_us++;
-    (void)brd_host_tell(&host, &seen, false);
+    (void)brd_host_report(&host, &seen, false);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(all, "\"event\":\"link\""), all);
 }
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """The images of the four boards on an emulated Cortex-M: scenarios.py, gateway_scenarios.py. What is long and the same on all families runs on the first
-board only, unless IWHEEL_FULL is 1. And the files beside each image, which flashing tools are given.
+board only, unless IWHEEL_FULL is 1. It also checks the files next to each image, which flashing tools need.
 """
 
 import functools
@@ -37,7 +37,7 @@ def cases():
 def begun(board, image, oscillator, beginning):
     """The rig after what several scenarios begin with."""
     emulate.load(WORK / "libmodel.so")
-    gc.disable()  # It takes a twentieth of the time, and has little to find before the end.
+    gc.disable()  # Garbage collection costs a twentieth of the time, and finds little before the end.
     rig = emulate.Rig(WORK / f"images/{board}-{image}.elf", oscillator)
     beginnings.run(rig, beginning)
     return rig

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Clocks and crystals that can give the bus 1 Mbit/s at 62.5 % do, exactly; the others do not compile, and the message names those that can. Wrong build
+"""Clocks and crystals that allow exactly 1 Mbit/s at 62.5 % compile; for the others the message of the compiler names those that do.
+=== Wrong build
 options are refused with a reason. The code of docs/developer/porting.md compiles and runs.
 """
 

@@ -3,7 +3,7 @@
 
 Proves, on a model of the chip that is not ours: base and offsets of the registers, the bits that switch transmitter and receiver on, status
 flags and data register in both directions, and the order in which serial.c sends what is written and what is lent. Does not: the DMA's
-channels, the pause on the line and line errors, which that model has not, nor the baud rate, which it takes without using it.
+channels, the pause on the line and line errors, which that model has not, nor the baud rate, which it accepts without using it.
 """
 
 import os
@@ -36,7 +36,7 @@ class Line:
     def say(self, text):
         os.write(self.terminal, text)
 
-    def hear(self, wanted):
+    def receive(self, wanted):
         """True once exactly that has been said next; false when something else is said, or the machine is gone."""
         end = time.monotonic() + PATIENCE_S
         while len(self.heard) < len(wanted) and time.monotonic() < end:
@@ -61,15 +61,15 @@ def test_uart(tmp_path, record_property):
             line = Line(next(found[1] for found in (re.search(r"(/dev/pts/\d+)", line) for line in machine.stdout) if found))
             machine.stdin.write('{"execute":"qmp_capabilities"}\n{"execute":"cont"}\n')
             machine.stdin.flush()
-            assert line.hear(b"console 115200\n"), "console.c: what is written comes out of USART2"
+            assert line.receive(b"console 115200\n"), "console.c: what is written comes out of USART2"
             line.say(b"x")
-            assert line.hear(b"serial\n"), "console.c: a character that is typed is noticed; serial.c starts anew and sends"
+            assert line.receive(b"serial\n"), "console.c: a character that is typed is noticed; serial.c restarts and sends"
             texts = [bytes(chance.choice(b"0123456789abcdef*{}") for _ in range(length)) + b"\n" for length in (1, 40, 127, 500, 511, 3, 512, 380)]
             for text in texts * 3:
                 line.say(text)
-                assert line.hear(text + text), "serial.c: every line comes back, from the ring and from a lent buffer, several times round both rings"
+                assert line.receive(text + text), "serial.c: every line comes back, from the ring and from a lent buffer, several times round both rings"
             line.say(b"end\n")
-            assert line.hear(b"end\nend\n"), "serial.c: idle when all is on the wire"
+            assert line.receive(b"end\nend\n"), "serial.c: idle when all is on the wire"
             line.say(b"\n")
             assert machine.wait(PATIENCE_S) == 0, "serial.c: no error was seen"
         finally:

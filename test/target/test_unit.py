@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Runs the core's unit tests on emulated Cortex-M0+, M3 and M4 (qemu-system-arm, semihosting).
 
-Takes the tests from test/unit/CMakeLists.txt that need nothing but the core, Unity and test/support. qemu has no Cortex-M0+; its
-Cortex-M0 runs the same instruction set. A test that does not fit the 16 KiB of RAM of that machine is told, and runs elsewhere.
+Runs the tests of test/unit/CMakeLists.txt that need nothing but the core, Unity and test/support. qemu has no Cortex-M0+; its
+Cortex-M0 runs the same instruction set. A test that does not fit the 16 KiB of RAM of that machine is listed, and runs elsewhere.
 The few slowest, which sweep every value, run on Cortex-M0+ only, the least of the three, unless IWHEEL_FULL is 1 (./check --full).
 """
 
@@ -17,7 +17,7 @@ from images import ROOT, WORK, must, run
 CPUS = {"cortex-m0plus": "microbit", "cortex-m3": "mps2-an385", "cortex-m4": "mps2-an386"}
 QEMU = "qemu-system-arm -nographic -monitor none -serial null -semihosting-config enable=on,target=native -M"
 CACHE = [shutil.which("ccache")] if shutil.which("ccache") else []
-SLOWEST = ("gateway_core_walk", "bit_timing", "codec_sweep", "envelope_scheduler")  # 5 to 20 s each; all others together take less.
+SLOWEST = ("gateway_core_walk", "bit_timing", "codec_sweep", "envelope_scheduler")  # 5 to 20 s each; all others together need less.
 
 
 class Builder:

@@ -281,7 +281,7 @@ TEST(test_purge_by_the_port_is_logged_once) {
 TEST(test_warnings_contain_left_setpoint_and_wrong_bitrate_once) {
     daemon_rig.link =
         (iwl_bus_link_t){.presence = IWL_LINK_UP, .echo_proven = true, .bitrate_hz = 500000, .changes = 7};
-    daemon_rig.daemon->answers.server.told.left_behind = true;
+    daemon_rig.daemon->answers.server.reported.left_behind = true;
     gw_bus_facts_follow(&daemon_rig.daemon->facts, &daemon_rig.daemon->wheels, true);
     const char *reply = daemon_rig_ask(client, "{\"cmd\":\"status\"}");
     const char *warnings = strstr(reply, "\"warnings\":[");

@@ -437,8 +437,9 @@ TEST(test_gateway_that_gives_way_ramps_logs_why_and_ends) {
 TEST(test_start_with_healthy_wheels_logs_no_fault) {
     daemon_rig_crash();
     daemon_rig_start();
-    TEST_ASSERT_EQUAL_UINT32(0,
-                             daemon_rig.daemon->answers.server.told.present); // The first poll finds no telemetry yet.
+    TEST_ASSERT_EQUAL_UINT32(
+        0,
+        daemon_rig.daemon->answers.server.reported.present); // The first poll finds no telemetry yet.
     daemon_rig_keep_log();
     daemon_rig_run(2000);
     TEST_ASSERT_NULL_MESSAGE(strstr(daemon_rig_log(), "wheel_lost"), daemon_rig_log());
@@ -451,7 +452,7 @@ TEST(test_start_without_wheels_logs_the_fault_after_a_second) {
     sim_world_power(&daemon_rig.world, daemon_rig.now_us, false);
     daemon_rig_crash();
     daemon_rig_start();
-    TEST_ASSERT_EQUAL_UINT32(0, daemon_rig.daemon->answers.server.told.present);
+    TEST_ASSERT_EQUAL_UINT32(0, daemon_rig.daemon->answers.server.reported.present);
     daemon_rig_keep_log();
     daemon_rig_run(900);
     TEST_ASSERT_NULL_MESSAGE(strstr(daemon_rig_log(), "wheel_lost"), daemon_rig_log());

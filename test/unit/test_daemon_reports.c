@@ -33,9 +33,9 @@ TEST(test_wheel_without_power_is_a_fault_one_second_after_start) {
     daemon_rig_crash();
     daemon_rig_start();
     daemon_rig_run(IWN_FIRST_TELEMETRY_US / IW_US_PER_MS - 50U);
-    TEST_ASSERT_EQUAL_UINT32(0U, daemon_rig.daemon->answers.server.told.present & lost);
+    TEST_ASSERT_EQUAL_UINT32(0U, daemon_rig.daemon->answers.server.reported.present & lost);
     daemon_rig_run(100);
-    TEST_ASSERT_EQUAL_UINT32(lost, daemon_rig.daemon->answers.server.told.present & lost);
+    TEST_ASSERT_EQUAL_UINT32(lost, daemon_rig.daemon->answers.server.reported.present & lost);
 }
 
 TEST(test_status_has_at_most_the_maximum_of_warnings) {
@@ -147,9 +147,9 @@ TEST(test_stop_is_reported_with_its_request) {
     const sock_handler_t *handler = &daemon->clients.handler;
     daemon_rig_arm(client);
     daemon_rig_drive(client, 100, 100, 200);
-    const uint32_t before = daemon->answers.server.told.stop_number;
+    const uint32_t before = daemon->answers.server.reported.stop_number;
     handler->carry_out(handler->context, &daemon->clients.client[0], line, sizeof line - 1U);
-    TEST_ASSERT_EQUAL_UINT32(before + 1U, daemon->answers.server.told.stop_number);
+    TEST_ASSERT_EQUAL_UINT32(before + 1U, daemon->answers.server.reported.stop_number);
 }
 
 TEST(test_arm_ended_by_estop_is_refused_with_id_and_reason) {

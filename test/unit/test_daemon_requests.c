@@ -402,7 +402,7 @@ TEST(test_end_of_zeros_is_reported_in_advance) {
     assert_reply("{\"cmd\":\"watch\",\"topics\":[\"stop\"]}", "\"ok\":true");
     seen.zeros_ending = true;
     gw_answers_observe(&daemon->answers, &seen);
-    TEST_ASSERT_TRUE(daemon->answers.server.told.zeros_ending);
+    TEST_ASSERT_TRUE(daemon->answers.server.reported.zeros_ending);
     TEST_ASSERT_EQUAL_UINT(1, count_told(false, false, "\"cause\":\"zeros_ending\",\"present\":true}"));
 }
 

@@ -79,7 +79,7 @@ static void run_once(void) {
             iw_setpoint_demand(&setpoint, now_us, IW_DEMAND_BRAKE);
         }
         now_us = iw_setpoint_next_us(&setpoint) + draw(30000U);
-        const iw_pair_t pair = iw_setpoint_take(&setpoint, now_us);
+        const iw_pair_t pair = iw_setpoint_next(&setpoint, now_us);
         send_through_gate(&envelope, &config, now_us, &pair);
     }
 }

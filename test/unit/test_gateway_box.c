@@ -360,7 +360,7 @@ TEST(test_rotation_cost_per_recording_is_constant) {
             TEST_ASSERT_EQUAL(0, close(fd));
         }
         calls = 0;
-        gw_box_files_rotate(directory, &(gw_box_room_t){8, UINT64_MAX, counts[i] + 1U, true});
+        gw_box_files_rotate(directory, &(gw_box_limits_t){8, UINT64_MAX, counts[i] + 1U, true});
         TEST_ASSERT_LESS_OR_EQUAL(3UL * counts[i] + 100UL, calls);
         TEST_ASSERT_EQUAL(8U * GW_BOX_ENDINGS, count_files());
     }
@@ -372,7 +372,7 @@ TEST(test_rotation_of_33000_recordings_retains_motion) {
     const int directory = open_in_memory();
     make_recordings(1, 3, 500);
     make_recordings(4, 33000, 0);
-    gw_box_files_rotate(directory, &(gw_box_room_t){8, UINT64_MAX, 33000, false});
+    gw_box_files_rotate(directory, &(gw_box_limits_t){8, UINT64_MAX, 33000, false});
     TEST_ASSERT_EQUAL(8, count_files());
     TEST_ASSERT_TRUE(is_there("stop-000001-made.jsonl"));
     TEST_ASSERT_TRUE(is_there("stop-000003-made.jsonl"));
@@ -510,7 +510,7 @@ TEST(test_oldest_recording_is_dropped_only_below_the_number) {
     TEST_ASSERT_FALSE(gw_box_files_drop_oldest(directory, 2, true));
     TEST_ASSERT_EQUAL(3, count_files());
     TEST_ASSERT_EQUAL(3, gw_box_files_next(directory));
-    gw_box_files_rotate(directory, &(gw_box_room_t){0, 0, 2, true}); // The newest always stays.
+    gw_box_files_rotate(directory, &(gw_box_limits_t){0, 0, 2, true}); // The newest always stays.
     TEST_ASSERT_EQUAL(3, count_files());
     (void)close(directory);
 }

@@ -7,14 +7,14 @@
 #include <string.h>
 
 static inspect_findings_t findings;
-static inspect_heard_t received;
+static inspect_traffic_t received;
 static const iwl_bus_link_t local = {.presence = IWL_LINK_LOCAL, .is_virtual = true, .echo_proven = true};
 static const inspect_config_t config = {
     .name = "can0", .bitrate_hz = 1000000, .sample_point_permille = 625, .refuses = true};
 
 void setUp(void) {
     inspect_begin(&findings);
-    inspect_heard_begin(&received);
+    inspect_traffic_begin(&received);
 }
 
 /// Receives two seconds of a healthy pair.
@@ -42,8 +42,8 @@ static void expect(const char *check, inspect_verdict_t verdict, const char *tex
     TEST_ASSERT_NOT_NULL_MESSAGE(finding, check);
     TEST_ASSERT_EQUAL_MESSAGE(verdict, finding->verdict, finding->text);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(finding->text, text), finding->text);
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(finding->cure, fix), finding->cure);
-    TEST_ASSERT_EQUAL_MESSAGE(verdict == INSPECT_OK, finding->cure[0] == '\0', "every finding has a fix");
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(finding->fix, fix), finding->fix);
+    TEST_ASSERT_EQUAL_MESSAGE(verdict == INSPECT_OK, finding->fix[0] == '\0', "every finding has a fix");
 }
 
 TEST(test_inspect_healthy_bus_has_no_finding) {
@@ -113,16 +113,16 @@ TEST(test_inspect_foreign_setpoints_fail_without_a_gateway) {
 TEST(test_inspect_unknown_ids_are_listed_up_to_a_limit) {
     iw_can_frame_t frame = {.id = 0x266U};
     hear_healthy();
-    inspect_heard_take(&received, &frame);
-    inspect_heard_take(&received, &frame);
+    inspect_traffic_count(&received, &frame);
+    inspect_traffic_count(&received, &frame);
     frame.id = 0x1ABCDEF0U | IW_CAN_EXTENDED;
-    inspect_heard_take(&received, &frame);
+    inspect_traffic_count(&received, &frame);
     inspect_bus(&local, &received, &config, &findings);
     expect("unknown_ids", INSPECT_WARN, "3 frames do not belong to the wheels: 0x266 0x1ABCDEF0",
            "iwheelctl record - --can can0 --for 2s | iwheelctl decode");
     for (uint32_t id = 1; id <= 20U; id++) {
         frame.id = id;
-        inspect_heard_take(&received, &frame);
+        inspect_traffic_count(&received, &frame);
     }
     inspect_begin(&findings);
     inspect_bus(&local, &received, &config, &findings);
@@ -134,9 +134,9 @@ TEST(test_inspect_damaged_frames_have_their_own_counts) {
     const iw_can_frame_t brief = {.id = IW_ID_LEFT_SPEED, .dlc = 3};
     const iw_can_frame_t remote = {.id = IW_ID_LEFT_SPEED | IW_CAN_REMOTE, .dlc = 4};
     const iw_can_frame_t echo = {.id = IW_ID_LEFT_SETPOINT, .dlc = 5, .kind = IW_CAN_ECHO};
-    inspect_heard_take(&received, &brief);
-    inspect_heard_take(&received, &remote);
-    inspect_heard_take(&received, &echo);
+    inspect_traffic_count(&received, &brief);
+    inspect_traffic_count(&received, &remote);
+    inspect_traffic_count(&received, &echo);
     TEST_ASSERT_EQUAL_UINT32(1U, received.bad_length);
     TEST_ASSERT_EQUAL_UINT32(1U, received.bad_format);
     TEST_ASSERT_EQUAL_UINT32(0U, received.count[inspect_message_of(IW_ID_LEFT_SETPOINT)]);
@@ -313,9 +313,9 @@ TEST(test_inspect_estop_levels_have_their_verdicts) {
 TEST(test_inspect_full_list_counts_further_failures) {
     for (unsigned i = 0; i < INSPECT_FINDINGS_MAX + 3U; i++) {
         inspect_say(&findings, "rates", INSPECT_FAIL, "%u", i);
-        inspect_cure(&findings, "cure %u", i);
+        inspect_fix(&findings, "cure %u", i);
     }
     TEST_ASSERT_EQUAL_UINT(INSPECT_FINDINGS_MAX, findings.count);
     TEST_ASSERT_EQUAL_UINT(INSPECT_FINDINGS_MAX + 3U, findings.total[INSPECT_FAIL]);
-    TEST_ASSERT_EQUAL_STRING("cure 39", findings.finding[INSPECT_FINDINGS_MAX - 1U].cure);
+    TEST_ASSERT_EQUAL_STRING("cure 39", findings.finding[INSPECT_FINDINGS_MAX - 1U].fix);
 }

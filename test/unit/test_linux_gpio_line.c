@@ -59,7 +59,7 @@ TEST(test_line_is_a_pulled_up_input_with_both_edges_nonblocking) {
     TEST_ASSERT_TRUE(fake_gpio.is_input);
     TEST_ASSERT_TRUE(fake_gpio.pulled_up);
     TEST_ASSERT_TRUE(fake_gpio.both_edges);
-    TEST_ASSERT_EQUAL_UINT(16U, fake_gpio.room);
+    TEST_ASSERT_EQUAL_UINT(16U, fake_gpio.buffer_size);
     TEST_ASSERT_EQUAL_INT(fake_gpio.ends[0], line.fd);
     TEST_ASSERT_TRUE((fcntl(line.fd, F_GETFL) & O_NONBLOCK) != 0);
     TEST_ASSERT_EQUAL_UINT(FAKE_GPIO_OFFSET, fake_gpio.offset);

@@ -2,7 +2,7 @@
 // Which MQTT commands are accepted, by their age on the clock of this machine and by the count of their sender, and
 // which events the bridge publishes about them.
 #include "mqtt_command.h"
-#include "mqtt_tell.h"
+#include "mqtt_contents.h"
 
 #include "unit.h"
 
@@ -261,9 +261,9 @@ TEST(test_messages_of_the_gateway_follow_the_fields_of_the_bridge) {
     const mqtt_buffer_t buffer = {text, sizeof text};
     const char *line = "{\"event\":\"fault\",\"t_us\":5}";
     const iwc_message_t event = {.text = line, .length = strlen(line), .is_event = true};
-    size_t length = mqtt_tell_state(BOOT, &event, buffer);
+    size_t length = mqtt_write_state(BOOT, &event, buffer);
     TEST_ASSERT_EQUAL_STRING_LEN("{\"boot\":\"" BOOT "\",\"event\":\"fault\",\"t_us\":5}", text, length);
-    length = mqtt_tell_event(BOOT, 7, 99, &event, buffer);
+    length = mqtt_write_event(BOOT, 7, 99, &event, buffer);
     TEST_ASSERT_EQUAL_STRING_LEN("{\"id\":\"" BOOT "-7\",\"boot\":\"" BOOT
                                  "\",\"heard_wall_us\":99,\"event\":\"fault\",\"t_us\":5}",
                                  text, length);
@@ -275,12 +275,12 @@ TEST(test_reply_quotes_time_seq_and_reply_of_the_gateway) {
     const char *line = "{\"id\":12,\"ok\":true,\"state\":\"stopping\"}";
     const iwc_message_t reply = {.text = line, .length = strlen(line)};
     (void)judge_it("why", NOW_US, 3, "", NOW_US);
-    size_t length = mqtt_tell_answer(BOOT, NOW_US, &order, &reply, buffer);
+    size_t length = mqtt_write_answer(BOOT, NOW_US, &order, &reply, buffer);
     TEST_ASSERT_EQUAL_STRING_LEN("{\"boot\":\"" BOOT
                                  "\",\"t_us\":50000000,\"cmd\":\"why\",\"seq\":3,\"ok\":true,\"state\":\"stopping\"}",
                                  text, length);
     (void)judge_it("why", NOW_US, 3, "", NOW_US);
-    length = mqtt_tell_answer(BOOT, NOW_US, &order, NULL, buffer);
+    length = mqtt_write_answer(BOOT, NOW_US, &order, NULL, buffer);
     TEST_ASSERT_EQUAL_STRING_LEN("{\"boot\":\"" BOOT
                                  "\",\"t_us\":50000000,\"cmd\":\"why\",\"seq\":3,\"ok\":false,\"error\":\"doubled\","
                                  "\"message\":\"seq must increase with each command of a sender\"}",
@@ -292,10 +292,10 @@ TEST(test_message_that_does_not_fit_is_not_written) {
     const char *line = "{\"event\":\"fault\",\"t_us\":5}";
     const iwc_message_t event = {.text = line, .length = strlen(line), .is_event = true};
     for (size_t size = 1; size < sizeof text; size++) {
-        const size_t length = mqtt_tell_state(BOOT, &event, (mqtt_buffer_t){text, size});
+        const size_t length = mqtt_write_state(BOOT, &event, (mqtt_buffer_t){text, size});
         TEST_ASSERT_TRUE(length == 0U || (length <= size && text[length - 1U] == '}'));
     }
-    TEST_ASSERT_EQUAL_size_t(0, mqtt_tell_event(BOOT, 1, 1, &event, (mqtt_buffer_t){text, sizeof text}));
+    TEST_ASSERT_EQUAL_size_t(0, mqtt_write_event(BOOT, 1, 1, &event, (mqtt_buffer_t){text, sizeof text}));
 }
 
 TEST(test_missed_stop_is_published_without_its_frames) {
@@ -303,7 +303,7 @@ TEST(test_missed_stop_is_published_without_its_frames) {
     const char *line = "{\"id\":1,\"ok\":true,\"number\":4,\"cause\":\"wheel_lost\",\"wall_us\":77,\"at_us\":66,"
                        "\"sentence\":\"gone\",\"frames_before\":[1,2,3]}";
     const iwc_message_t why = {.text = line, .length = strlen(line)};
-    const size_t length = mqtt_tell_missed_stop(BOOT, 2, 99, &why, (mqtt_buffer_t){text, sizeof text});
+    const size_t length = mqtt_write_missed_stop(BOOT, 2, 99, &why, (mqtt_buffer_t){text, sizeof text});
     text[length] = '\0';
     TEST_ASSERT_NOT_NULL(
         strstr(text, "\"event\":\"stop\",\"missed\":true,\"t_us\":66,\"number\":4,\"cause\":\"wheel_lost\""));
@@ -318,7 +318,7 @@ TEST(test_info_without_a_gateway_has_no_values_of_it) {
     settings = mqtt_settings_standard;
     mqtt_stop_t stop = {.number = 0};
     const mqtt_info_t info = {.boot = BOOT, .settings = &settings, .counts = counts, .dropped = 3, .stop = &stop};
-    size_t length = mqtt_tell_info(&info, (mqtt_buffer_t){text, sizeof text});
+    size_t length = mqtt_write_info(&info, (mqtt_buffer_t){text, sizeof text});
     text[length] = '\0';
     TEST_ASSERT_NOT_NULL(strstr(text, "\"last_stop\":null}"));
     TEST_ASSERT_NOT_NULL(strstr(text, "\"gateway\":\"away\",\"version\":null,"));
@@ -326,7 +326,7 @@ TEST(test_info_without_a_gateway_has_no_values_of_it) {
     TEST_ASSERT_NOT_NULL(strstr(text, "\"taken\":1,\"retained\":2,"));
     TEST_ASSERT_NOT_NULL(strstr(text, "\"dropped\":3,\"last\":0,\"aside\":0,\"on_disk\":false"));
     stop = (mqtt_stop_t){.number = 4, .cause = "wheel_lost", .sentence = "gone"};
-    length = mqtt_tell_info(&info, (mqtt_buffer_t){text, sizeof text});
+    length = mqtt_write_info(&info, (mqtt_buffer_t){text, sizeof text});
     text[length] = '\0';
     TEST_ASSERT_NOT_NULL(
         strstr(text, "\"last_stop\":{\"number\":4,\"cause\":\"wheel_lost\",\"wall_us\":null,\"sentence\":\"gone\"}}"));

@@ -77,7 +77,7 @@ TEST(test_history_doubles_are_dropped_across_bridge_restarts) {
     stop("a", 2, 2, 2, 5);
     stop("b", 3, 3, 3, 6);
     stop("b", 4, 4, 4, 7);
-    TEST_ASSERT_EQUAL_UINT64(4, history.told);
+    TEST_ASSERT_EQUAL_UINT64(4, history.printed);
     TEST_ASSERT_EQUAL_UINT64(3, history.doubled);
     TEST_ASSERT_EQUAL_UINT64(0, history.missing + history.unheard);
 }
@@ -130,7 +130,7 @@ TEST(test_history_late_event_is_no_double_and_closes_its_gap) {
     stop("a", 4, 4, 1, 4);
     stop("a", 6, 6, 5, 5);
     TEST_ASSERT_EQUAL_UINT64(0, history.missing + history.unheard);
-    TEST_ASSERT_EQUAL_UINT64(6, history.told);
+    TEST_ASSERT_EQUAL_UINT64(6, history.printed);
 }
 
 /// Adds an info message: `last_stop` with its time in seconds after EVENING_US, and the counts of events.
@@ -216,7 +216,7 @@ TEST(test_history_span_accepts_either_clock_of_an_event) {
     stop("a", 3, 3, -1000000, 10);
     stop("a", 4, 4, 1000000, 20);
     stop("a", 5, 5, 3600, 3601);
-    TEST_ASSERT_EQUAL_UINT64(3, history.told);
+    TEST_ASSERT_EQUAL_UINT64(3, history.printed);
     TEST_ASSERT_NOT_NULL(strstr(text(), "stop number 2 (stored 2026-11-22 00:30:00)\n"));
     TEST_ASSERT_NOT_NULL(strstr(printed, "stop number 3 (stored 2026-11-21 22:00:10)\n"));
     TEST_ASSERT_NOT_NULL(
@@ -254,7 +254,7 @@ TEST(test_history_garbage_is_counted_and_prints_no_escape) {
     TEST_ASSERT_EQUAL_UINT64(5, history.garbled);
     other("stop", "{\"id\":\"-\",\"sentence\":\"\\u001b[2J\"}");
     other("fault", "{\"id\":7,\"cause\":\"\\u001b[2J\",\"present\":[\"\\u001b\"]}");
-    TEST_ASSERT_EQUAL_UINT64(2, history.told);
+    TEST_ASSERT_EQUAL_UINT64(2, history.printed);
     TEST_ASSERT_NULL(strchr(text(), '\033'));
 }
 

@@ -127,7 +127,7 @@ TEST(test_permit_arm_is_judged_by_the_view_of_the_last_step) {
     static const struct {
         size_t flag;
         iw_refusal_t refusal;
-    } cases[] = {{offsetof(iw_permit_view_t, heard), IW_REFUSE_WHEEL_LOST},
+    } cases[] = {{offsetof(iw_permit_view_t, online), IW_REFUSE_WHEEL_LOST},
                  {offsetof(iw_permit_view_t, at_rest), IW_REFUSE_NOT_AT_REST},
                  {offsetof(iw_permit_view_t, output_zero), IW_REFUSE_NOT_AT_REST},
                  {offsetof(iw_permit_view_t, timing_ok), IW_REFUSE_TIMING_MISMATCH},
@@ -208,7 +208,7 @@ TEST(test_permit_arm_after_a_drive_of_any_client_is_stale_command) {
 }
 
 TEST(test_permit_arm_after_a_noted_drive_is_stale_command) {
-    iw_permit_remember(&rig.permit, rig.now_us, OTHER);
+    iw_permit_note_command(&rig.permit, rig.now_us, OTHER);
     permit_rig_wait(&rig, MS(499));
     assert_arm_refused(IW_REFUSE_STALE_COMMAND);
     TEST_ASSERT_EQUAL_INT(OTHER, rig.permit.stale_client);

@@ -223,7 +223,7 @@ TEST(test_permit_unjudged_step_retains_levels_and_adds_causes) {
     permit_rig_raise(&rig, IW_CAUSE_BUS_DOWN);
     permit_rig_step(&rig);
     permit_rig_raise(&rig, IW_CAUSE_ESTOP_LINE);
-    iw_permit_keep_present(&rig.permit);
+    iw_permit_retain_present(&rig.permit);
     permit_rig_step(&rig);
     TEST_ASSERT_EQUAL_HEX32(1U << IW_CAUSE_ESTOP_LINE | 1U << IW_CAUSE_WHEEL_LOST,
                             iw_permit_present(&rig.permit, rig.now_us));

@@ -248,10 +248,10 @@ TEST(test_permit_reset_within_a_second_of_an_event_is_refused) {
 
 TEST(test_permit_reset_needs_telemetry_and_standstill) {
     latch_and_calm(IW_CAUSE_INTERNAL);
-    rig.view.heard = false;
+    rig.view.online = false;
     permit_rig_step(&rig);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_WHEEL_LOST, permit_rig_reset(&rig));
-    rig.view.heard = true;
+    rig.view.online = true;
     rig.view.at_rest = false;
     permit_rig_step(&rig);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_AT_REST, permit_rig_reset(&rig));
@@ -304,7 +304,7 @@ TEST(test_permit_restarted_sends_zeros_before_listening) {
 
 TEST(test_permit_restarted_without_any_wheel_ends_the_hold) {
     permit_rig_init_restarted(&rig);
-    rig.view.heard = false;
+    rig.view.online = false;
     rig.view.at_rest = false;
     rig.view.settled = false;
     permit_rig_raise(&rig, IW_CAUSE_WHEEL_LOST);

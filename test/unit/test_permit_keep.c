@@ -271,7 +271,7 @@ TEST(test_permit_keep_continues_through_every_other_fault) {
                                         IW_CAUSE_WHEEL_REBOOTED, IW_CAUSE_WHEEL_LOST, IW_CAUSE_OVERSPEED};
     for (size_t i = 0; i < sizeof causes / sizeof causes[0]; i++) {
         permit_rig_begin(&rig, PERMIT_HOLDING);
-        rig.view.heard = false;
+        rig.view.online = false;
         permit_rig_raise(&rig, causes[i]);
         permit_rig_step(&rig);
         assert_held_for_a_day(IW_STATE_LATCHED);

@@ -88,7 +88,7 @@ TEST(test_permit_lease_is_extended_by_no_other_request) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_takeover(&rig, HOLDER));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_HOLDER, permit_rig_drive(&rig, OTHER, true));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_reset(&rig));
-    iw_permit_remember(&rig.permit, rig.now_us, HOLDER);
+    iw_permit_note_command(&rig.permit, rig.now_us, HOLDER);
     iw_permit_disconnect(&rig.permit, rig.now_us, OTHER);
     (void)permit_rig_arm(&rig, OTHER);
     (void)permit_rig_takeover(&rig, OTHER);

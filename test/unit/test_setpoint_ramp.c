@@ -95,7 +95,7 @@ TEST(test_setpoint_ramp_after_1_us_is_not_zero_and_continues) {
     rig.config.accel_mm_s2 = 2000;
     setpoint_rig_follow(&rig);
     setpoint_rig_command(&rig, 1, 1, 2000);
-    (void)iw_setpoint_take(&rig.setpoint, rig.now_us + 1U);
+    (void)iw_setpoint_next(&rig.setpoint, rig.now_us + 1U);
     TEST_ASSERT_FALSE(setpoint_rig_is_zero(&rig)); // The speed is a thousandth of a mm/s.
     const iw_pair_t pair = setpoint_rig_take_next(&rig);
     TEST_ASSERT_EQUAL_INT16(1, pair.wheel[IW_LEFT].speed_mm_s);

@@ -21,7 +21,7 @@ static iw_pair_t pair_of(int16_t left_mm_s, int16_t right_mm_s) {
 
 static iw_pair_t take_at(iw_time_us_t now_us) {
     TEST_ASSERT_TRUE_MESSAGE(iw_setpoint_due(&setpoint, now_us), "a pair must be due");
-    return iw_setpoint_take(&setpoint, now_us);
+    return iw_setpoint_next(&setpoint, now_us);
 }
 
 static void command_at(iw_time_us_t now_us, int16_t left_mm_s, int16_t right_mm_s) {

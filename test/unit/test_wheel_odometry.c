@@ -43,7 +43,7 @@ static iw_reboot_t jump_from(int32_t from, int32_t to, iw_time_us_t after_us) {
     }
     now_us = until_us - MS(40);
     hear_ticks(to);
-    return iw_wheel_take_reboot(&wheel);
+    return iw_wheel_next_reboot(&wheel);
 }
 
 /// The ticks jump by `ticks`, `after_us` after the previous status frame.
@@ -59,7 +59,7 @@ TEST(test_wheel_first_status_frame_is_no_distance) {
     hear_ticks(INT32_MIN);
     TEST_ASSERT_EQUAL_INT64(0, wheel.ticks);
     TEST_ASSERT_EQUAL_INT64(0, distance_nm());
-    TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_next_reboot(&wheel));
 }
 
 TEST(test_wheel_ticks_add_up_in_both_directions) {
@@ -78,7 +78,7 @@ TEST(test_wheel_ticks_unwrap_in_both_directions) {
     TEST_ASSERT_EQUAL_INT64(4, wheel.ticks);
     hear_ticks(INT32_MIN);
     TEST_ASSERT_EQUAL_INT64(5, wheel.ticks);
-    TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_next_reboot(&wheel));
 }
 
 TEST(test_wheel_ticks_continue_beyond_32_bits) {
@@ -122,7 +122,7 @@ TEST(test_wheel_jump_beyond_physics_is_a_reboot_not_a_distance) {
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_ODOMETRY, jump(INT32_MAX - 5000, MS(40)));
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_ODOMETRY, jump(INT32_MIN, MS(40)));
     hear_ticks(5001 + INT32_MIN);
-    TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_next_reboot(&wheel));
     TEST_ASSERT_TRUE(wheel.ticks <= 1);
 }
 
@@ -147,9 +147,9 @@ TEST(test_wheel_small_jump_is_accepted_at_any_interval) {
     iw_wheel_receive(&wheel, now_us, first.kind, &first.as, true);
     iw_wheel_receive(&wheel, now_us, second.kind, &second.as, true);
     TEST_ASSERT_EQUAL_INT64(30, wheel.ticks);
-    TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_next_reboot(&wheel));
     iw_wheel_receive(&wheel, now_us, third.kind, &third.as, true);
-    TEST_ASSERT_EQUAL_INT(IW_REBOOT_ODOMETRY, iw_wheel_take_reboot(&wheel));
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_ODOMETRY, iw_wheel_next_reboot(&wheel));
 }
 
 TEST(test_wheel_jump_after_hours_without_status_is_still_judged) {
@@ -260,7 +260,7 @@ TEST(test_wheel_distance_survives_reboots) {
     hear_ticks(1000);
     hear_ticks(1010);
     hear_ticks(0);
-    TEST_ASSERT_EQUAL_INT(IW_REBOOT_ODOMETRY, iw_wheel_take_reboot(&wheel));
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_ODOMETRY, iw_wheel_next_reboot(&wheel));
     hear_ticks(7);
     TEST_ASSERT_EQUAL_INT64(17, wheel.ticks);
 }

@@ -64,7 +64,7 @@ TEST(test_wheel_never_received_is_lost_and_not_at_standstill) {
     TEST_ASSERT_FALSE(rests(now_us, 0));
     TEST_ASSERT_TRUE(wheel.speed_us == IW_NEVER);
     TEST_ASSERT_TRUE(wheel.rest_since_us == IW_NEVER);
-    TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_next_reboot(&wheel));
     iw_wheel_excuse(&wheel, now_us + MS(100));
     TEST_ASSERT_TRUE(iw_wheel_lost(&wheel, now_us + MS(100)));
 }
@@ -202,11 +202,11 @@ TEST(test_wheel_offline_for_a_second_has_rebooted) {
     receive(0);
     now_us += MS(1000) - 1U;
     receive(0);
-    TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_next_reboot(&wheel));
     now_us += MS(1000);
     receive(0);
-    TEST_ASSERT_EQUAL_INT(IW_REBOOT_SILENCE, iw_wheel_take_reboot(&wheel));
-    TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_SILENCE, iw_wheel_next_reboot(&wheel));
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_next_reboot(&wheel));
     TEST_ASSERT_EQUAL_UINT32(1, wheel.reboots);
     TEST_ASSERT_TRUE(wheel.boot_seen);
 }
@@ -218,7 +218,7 @@ TEST(test_wheel_that_sends_any_frame_has_not_rebooted) {
         hear_status(0);
     }
     receive(0);
-    TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_next_reboot(&wheel));
 }
 
 TEST(test_wheel_silence_of_our_own_stall_is_no_reboot) {
@@ -228,19 +228,19 @@ TEST(test_wheel_silence_of_our_own_stall_is_no_reboot) {
     hear_as(0, false);
     now_us += MS(4);
     receive(0);
-    TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_next_reboot(&wheel));
 }
 
 TEST(test_wheel_first_frame_is_no_reboot_but_may_set_boot_seen) {
     now_us += MS(1000) - 1U;
     receive(0);
     TEST_ASSERT_FALSE(wheel.boot_seen);
-    TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_next_reboot(&wheel));
     begin();
     now_us += MS(1000);
     receive(0);
     TEST_ASSERT_TRUE(wheel.boot_seen);
-    TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_next_reboot(&wheel));
     TEST_ASSERT_EQUAL_UINT32(0, wheel.reboots);
 }
 
@@ -249,7 +249,7 @@ static void hear_offsets(uint32_t number, iw_time_us_t period_us) {
     for (uint32_t n = 0; n < number; n++) {
         hear_for(period_us, 0);
         hear_other(IW_CODEC_OFFSET);
-        TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
+        TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_next_reboot(&wheel));
     }
 }
 
@@ -288,7 +288,7 @@ TEST(test_wheel_offset_frames_that_return_are_a_reboot) {
             hear_offsets(heard_s[i], IW_WHEEL_OFFSET_PERIOD_US);
             hear_for(IW_WHEEL_OFFSET_BACK_US - early_us, 0);
             hear_other(IW_CODEC_OFFSET);
-            TEST_ASSERT_EQUAL_INT(early_us ? IW_REBOOT_NONE : IW_REBOOT_OFFSET_FRAMES, iw_wheel_take_reboot(&wheel));
+            TEST_ASSERT_EQUAL_INT(early_us ? IW_REBOOT_NONE : IW_REBOOT_OFFSET_FRAMES, iw_wheel_next_reboot(&wheel));
             hear_offsets(60, IW_WHEEL_OFFSET_PERIOD_US);
             TEST_ASSERT_EQUAL_UINT32(early_us ? 0 : 1, wheel.reboots);
         }
@@ -299,12 +299,12 @@ TEST(test_wheel_found_old_has_rebooted_at_an_offset_frame) {
     receive(0);
     hear_for(IW_WHEEL_OFFSET_BACK_US - 1U, 0);
     hear_other(IW_CODEC_OFFSET); // At this time the wheel may just have started.
-    TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_next_reboot(&wheel));
     begin();
     receive(0);
     hear_for(IW_WHEEL_OFFSET_BACK_US, 0);
     hear_other(IW_CODEC_OFFSET);
-    TEST_ASSERT_EQUAL_INT(IW_REBOOT_OFFSET_FRAMES, iw_wheel_take_reboot(&wheel));
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_OFFSET_FRAMES, iw_wheel_next_reboot(&wheel));
     TEST_ASSERT_TRUE(wheel.boot_seen);
 }
 
@@ -314,13 +314,13 @@ TEST(test_wheel_reboot_within_a_minute_shows_by_silence_or_ticks) {
     hear_offsets(20, IW_WHEEL_OFFSET_PERIOD_US);
     now_us += IW_WHEEL_REBOOT_SILENCE_US;
     receive(0);
-    TEST_ASSERT_EQUAL_INT(IW_REBOOT_SILENCE, iw_wheel_take_reboot(&wheel));
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_SILENCE, iw_wheel_next_reboot(&wheel));
     hear_for(IW_WHEEL_OFFSET_LEARN_US + IW_WHEEL_OFFSET_PERIOD_US, 0);
     hear_offsets(20, IW_WHEEL_OFFSET_PERIOD_US);
     hear_status(100000);
     hear_for(MS(400), 0);
     hear_status(0);
-    TEST_ASSERT_EQUAL_INT(IW_REBOOT_ODOMETRY, iw_wheel_take_reboot(&wheel));
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_ODOMETRY, iw_wheel_next_reboot(&wheel));
     hear_for(IW_WHEEL_OFFSET_LEARN_US + IW_WHEEL_OFFSET_PERIOD_US, 0);
     hear_offsets(20, IW_WHEEL_OFFSET_PERIOD_US);
     TEST_ASSERT_EQUAL_UINT32(2, wheel.reboots);
@@ -333,7 +333,7 @@ TEST(test_wheel_offset_frames_after_our_own_stall_are_a_reboot) {
     now_us += IW_WHEEL_OFFSET_BACK_US;
     iw_wheel_excuse(&wheel, now_us);
     hear_other(IW_CODEC_OFFSET);
-    TEST_ASSERT_EQUAL_INT(IW_REBOOT_OFFSET_FRAMES, iw_wheel_take_reboot(&wheel));
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_OFFSET_FRAMES, iw_wheel_next_reboot(&wheel));
 }
 
 TEST(test_wheel_late_frames_of_other_kinds_are_no_reboot) {
@@ -341,7 +341,7 @@ TEST(test_wheel_late_frames_of_other_kinds_are_no_reboot) {
     hear_for(MS(70000), 0);
     for (size_t i = 0; i < sizeof others / sizeof others[0]; i++) {
         hear_other(others[i]);
-        TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
+        TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_next_reboot(&wheel));
     }
 }
 
@@ -353,7 +353,7 @@ TEST(test_wheel_power_cut_with_restarted_odometry_is_one_reboot) {
     receive(0);
     now_us += MS(40);
     hear_status(1);
-    TEST_ASSERT_EQUAL_INT(IW_REBOOT_SILENCE, iw_wheel_take_reboot(&wheel));
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_SILENCE, iw_wheel_next_reboot(&wheel));
     TEST_ASSERT_EQUAL_UINT32(1, wheel.reboots);
     TEST_ASSERT_TRUE(wheel.ticks == 1);
 }

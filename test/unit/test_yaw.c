@@ -109,13 +109,13 @@ TEST(test_yaw_bound_is_the_growth_up_to_the_limit) {
 TEST(test_yaw_room_is_the_margin_on_the_side_of_the_change) {
     static const struct {
         int32_t bound, from, change;
-        uint32_t room;
+        uint32_t margin;
     } cases[] = {{21600, 0, 21601, 21598}, {6000, 5000, 3000, 998},    {6000, -5000, 12000, 10998},
                  {6000, 6000, 1, 0},       {6000, 5998, 100, 0},       {6000, 5997, 100, 1},
                  {6000, 5999, 100, 0},     {540000, 0, 600000, 539998}};
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
-        TEST_ASSERT_EQUAL_UINT32(cases[i].room, iw_yaw_room(cases[i].bound, cases[i].from, cases[i].change));
-        TEST_ASSERT_EQUAL_UINT32(cases[i].room, iw_yaw_room(cases[i].bound, -cases[i].from, -cases[i].change));
+        TEST_ASSERT_EQUAL_UINT32(cases[i].margin, iw_yaw_margin(cases[i].bound, cases[i].from, cases[i].change));
+        TEST_ASSERT_EQUAL_UINT32(cases[i].margin, iw_yaw_margin(cases[i].bound, -cases[i].from, -cases[i].change));
     }
 }
 

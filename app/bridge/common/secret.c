@@ -18,13 +18,13 @@ bool bridge_secret_draw(char out[BRIDGE_SECRET_SIZE]) {
     return true;
 }
 
-bool bridge_secret_is(const char *secret, const char *given) {
+bool bridge_secret_is(const char *secret, const char *candidate) {
     const size_t length = strlen(secret);
-    const size_t given_length = strlen(given);
-    unsigned difference = (length == given_length && length > 0U) ? 0U : 1U;
-    for (size_t i = 0; i < given_length; i++) {
+    const size_t candidate_length = strlen(candidate);
+    unsigned difference = (length == candidate_length && length > 0U) ? 0U : 1U;
+    for (size_t i = 0; i < candidate_length; i++) {
         difference |=
-            (unsigned)(unsigned char)given[i] ^ (unsigned)(unsigned char)secret[(length > 0U) ? i % length : 0U];
+            (unsigned)(unsigned char)candidate[i] ^ (unsigned)(unsigned char)secret[(length > 0U) ? i % length : 0U];
     }
     return difference == 0U;
 }

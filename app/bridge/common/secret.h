@@ -12,6 +12,6 @@
 bool bridge_secret_draw(char out[BRIDGE_SECRET_SIZE]);
 
 /// Returns true if both texts are equal and not empty. The time does not depend on the position of a difference.
-bool bridge_secret_is(const char *secret, const char *given);
+bool bridge_secret_is(const char *secret, const char *candidate);
 
 #endif

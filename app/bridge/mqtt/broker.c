@@ -134,21 +134,21 @@ int mqtt_broker_open(mqtt_broker_t *self, const mqtt_settings_t *settings, const
 /// Counts short connections. If the broker ends several connections just after it accepted them, another client usually
 /// has the same name. MQTT 3.1.1 has no code for that.
 static void judge_end(mqtt_broker_t *self) {
-    const bool taken = self->refusal == MQTT_RC_SESSION_TAKEN_OVER;
+    const bool name_in_use = self->refusal == MQTT_RC_SESSION_TAKEN_OVER;
     const bool was_short = self->state == MQTT_UP && self->now_us - self->up_us < SHORT_US;
     self->short_ones = (was_short || self->state != MQTT_UP) ? self->short_ones + (was_short ? 1U : 0U) : 0U;
-    if (!taken && self->short_ones < SHORT_MAX) {
+    if (!name_in_use && self->short_ones < SHORT_MAX) {
         return;
     }
-    self->taken++;
+    self->name_in_use++;
     if (self->now_us >= self->short_us) {
         (void)fprintf(
             stderr,
             "%s: the broker at %s ended the connection %s; the name %s or the user is used by another client: "
             "configure a separate name for each machine and each console%s\n",
             self->listener.program, self->host,
-            taken ? "because another client used its name" : "repeatedly, shortly after accepting it",
-            self->listener.name, taken ? "" : ", or see the broker's log for a message that it does not accept");
+            name_in_use ? "because another client used its name" : "repeatedly, shortly after accepting it",
+            self->listener.name, name_in_use ? "" : ", or see the broker's log for a message that it does not accept");
         self->short_us = self->now_us + SHORT_TOLD_US;
     }
 }

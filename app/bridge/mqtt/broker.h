@@ -76,7 +76,7 @@ typedef struct {
     uint64_t up_us;            ///< Time at which the broker accepted this connection.
     unsigned short_ones;       ///< Short connections in a row.
     uint64_t short_us;         ///< Time from which the log may report them again.
-    uint64_t taken;            ///< Connections that another client with this name has ended, as far as known.
+    uint64_t name_in_use;      ///< Connections that another client with this name has ended, as far as known.
     bool lost;                 ///< Set by callbacks of the library; the state changes after the call.
     int refusal;               ///< Reason of the last CONNACK, or of a DISCONNECT of MQTT 5.
     char words[160];           ///< Last error or warning of the library.

@@ -4,7 +4,7 @@
 
 #include "broker.h"
 #include "fetch.h"
-#include "mqtt_tell.h"
+#include "mqtt_contents.h"
 
 #include "common/bridge_service.h"
 #include "iwheel_northbound/json_out.h"

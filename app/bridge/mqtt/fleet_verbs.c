@@ -68,7 +68,7 @@ static bool take_stored(void *context, const char *topic, const char *payload, s
 
 /// Reads the stops before the start of this console. Without a stream the `info` of the machines is used.
 static void read_last_stops(console_t *self, const mqtt_settings_t *settings) {
-    const stream_config_t config = {.event = "stop", .last = true, .take = take_stored, .context = self};
+    const stream_config_t config = {.event = "stop", .last = true, .visit = take_stored, .context = self};
     char why[STREAM_WHY_SIZE];
     if (settings->broker.stream_port == 0U) {
         return;
@@ -224,7 +224,7 @@ int fleet_verb_history(const mqtt_settings_t *settings, const fleet_wanted_t *wa
     const int64_t since_us = (wanted->span.machine != NULL) ? 1 : wanted->span.since_us - AHEAD_US;
     const stream_config_t config = {.machine = wanted->span.machine,
                                     .since_us = (since_us > 0) ? since_us : 1,
-                                    .take = history_take,
+                                    .visit = history_take,
                                     .context = &history};
     if (!history_open(&history, &wanted->span, stdout)) {
         return complain(EX_OSERR, "no memory");

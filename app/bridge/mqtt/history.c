@@ -268,8 +268,8 @@ static void show(const history_t *self, const history_machine_t *machine, const 
     (void)fputs("\n", self->out);
 }
 
-static void tell(const history_t *self, const history_machine_t *machine, const iwc_message_t *event,
-                 const int64_t times_us[2]) {
+static void print_event(const history_t *self, const history_machine_t *machine, const iwc_message_t *event,
+                        const int64_t times_us[2]) {
     static char line[IWC_LINE_MAX + 1024U];
     iwn_out_t json;
     iwn_out_init(&json, line, sizeof line);
@@ -331,15 +331,15 @@ bool history_take(void *context, const char *topic, const char *payload, size_t 
         return true;
     }
     if (self->config.json) {
-        tell(self, machine, &event, times_us);
+        print_event(self, machine, &event, times_us);
     } else {
         show(self, machine, &event, name, times_us);
     }
     self->missing += machine->missing;
     self->unheard += machine->unheard;
     forget_gap(machine);
-    machine->told = true;
-    self->told++;
+    machine->printed = true;
+    self->printed++;
     return ferror(self->out) == 0;
 }
 
@@ -348,21 +348,21 @@ void history_sum(const history_t *self, const char *host) {
     char until[HISTORY_TIME_SIZE];
     size_t machines = 0;
     for (size_t i = 0; i < self->count; i++) {
-        machines += self->machines[i].told ? 1U : 0U;
+        machines += self->machines[i].printed ? 1U : 0U;
     }
     if (self->config.json) {
         (void)fprintf(self->out,
                       "{\"events\":%" PRIu64 ",\"machines\":%zu,\"doubled\":%" PRIu64 ",\"garbled\":%" PRIu64
                       ",\"missing\":%" PRIu64 ",\"stops_missing\":%" PRIu64
                       ",\"end_checked\":%s,\"since_wall_us\":%" PRId64 ",\"until_wall_us\":%" PRId64 "}\n",
-                      self->told, machines, self->doubled, self->garbled, self->missing, self->unheard,
+                      self->printed, machines, self->doubled, self->garbled, self->missing, self->unheard,
                       self->has_info ? "true" : "false", self->config.since_us, self->config.until_us);
         return;
     }
     history_time(self->config.since_us, since);
     history_time(self->config.until_us, until);
-    (void)fprintf(self->out, "%" PRIu64 " %s%s of %zu machine%s, %s to %s, from the stream at %s", self->told,
-                  self->config.all ? "event" : "stop", (self->told == 1U) ? "" : "s", machines,
+    (void)fprintf(self->out, "%" PRIu64 " %s%s of %zu machine%s, %s to %s, from the stream at %s", self->printed,
+                  self->config.all ? "event" : "stop", (self->printed == 1U) ? "" : "s", machines,
                   (machines == 1U) ? "" : "s", since, until, host);
     if (self->doubled > 0U) {
         (void)fprintf(self->out, "; %" PRIu64 " duplicates left out", self->doubled);

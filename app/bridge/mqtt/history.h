@@ -64,7 +64,7 @@ typedef struct {
     uint64_t missing; ///< Missing events before the next printed one.
     uint64_t unheard; ///< Missing stops before the next printed event.
     bool began;       ///< Its bridge restarted before the next printed event.
-    bool told;
+    bool printed;
 } history_machine_t;
 
 typedef struct {
@@ -72,7 +72,7 @@ typedef struct {
     FILE *out;
     history_machine_t *machines; ///< FLEET_MACHINES entries, in the order of arrival.
     size_t count;
-    uint64_t told;
+    uint64_t printed;
     uint64_t doubled;
     uint64_t garbled; ///< Includes events of machines beyond FLEET_MACHINES.
     uint64_t missing;
@@ -85,7 +85,7 @@ typedef struct {
 bool history_open(history_t *self, const history_config_t *config, FILE *out);
 void history_close(history_t *self);
 
-/// Receives one event of the stream, in the order of storage. It has the type `stream_take_t`, with the history as
+/// Receives one event of the stream, in the order of storage. It has the type `stream_visit_t`, with the history as
 /// context. Returns false if the output is closed.
 bool history_take(void *context, const char *topic, const char *payload, size_t length, int64_t stored_us);
 

@@ -118,10 +118,10 @@ static void tell_end(const history_t *self, const history_machine_t *machine, ui
 void history_end(history_t *self) {
     for (size_t i = 0; i < self->count; i++) {
         const history_machine_t *machine = &self->machines[i];
-        const bool wished = self->config.machine == NULL || strcmp(self->config.machine, machine->id) == 0;
+        const bool selected = self->config.machine == NULL || strcmp(self->config.machine, machine->id) == 0;
         const uint64_t events = machine->missing + events_behind(self, machine);
         const uint64_t stops = machine->unheard + stops_behind(self, machine);
-        if (!wished || events + stops == 0U) {
+        if (!selected || events + stops == 0U) {
             continue;
         }
         self->missing += events;

@@ -35,13 +35,13 @@ static void tell_info(mqtt_bridge_t *self) {
                               .aside = self->spool.aside,
                               .sensors = self->sensors_sent,
                               .sensors_seen = (size_t)__builtin_popcount(self->sensors_seen),
-                              .name_taken = self->broker.taken,
+                              .name_taken = self->broker.name_in_use,
                               .refused = self->refusals.count,
                               .refusal = self->refusals.last,
                               .on_disk = !self->spool.behind,
                               .unsent = self->broker.unsent,
                               .stop = &self->stop};
-    const size_t length = mqtt_tell_info(&info, buffer(self));
+    const size_t length = mqtt_write_info(&info, buffer(self));
     self->info_due = false; // Set before publishing, so that a refusal of this message does not make it due again.
     const int message = mqtt_bridge_publish(self, "info", NULL, length, retained);
     self->info_due = message == MQTT_NOT_NOW;
@@ -85,7 +85,7 @@ static void remember_stop(mqtt_bridge_t *self, const iwc_message_t *stop) {
 }
 
 static void take_stop(mqtt_bridge_t *self, const iwc_message_t *event) {
-    const size_t length = mqtt_tell_event(self->boot, self->spool.last + 1U, bridge_wall_us(), event, buffer(self));
+    const size_t length = mqtt_write_event(self->boot, self->spool.last + 1U, bridge_wall_us(), event, buffer(self));
     keep_event(self, "stop", length, (uint64_t)iwc_integer(event, "wall_us").value);
     remember_stop(self, event);
     bridge_lease_end(&self->lease, self->now_us);
@@ -99,7 +99,7 @@ static void take_why(void *context, const iwc_message_t *reply) {
     }
     if (reply != NULL && iwc_integer(reply, "number").value > 0 && stop_us != self->spool.mark) {
         const size_t length =
-            mqtt_tell_missed_stop(self->boot, self->spool.last + 1U, bridge_wall_us(), reply, buffer(self));
+            mqtt_write_missed_stop(self->boot, self->spool.last + 1U, bridge_wall_us(), reply, buffer(self));
         keep_event(self, "stop", length, stop_us);
     }
 }
@@ -110,13 +110,21 @@ static void read_condition(const iwc_message_t *state, char *out, size_t size) {
     char cause[32];
     char estop[16];
     char bus[16];
-    (void)iwc_text(state, "state", machine, sizeof machine);
-    (void)iwc_text(state, "cause", cause, sizeof cause);
-    (void)iwc_text(state, "estop.state", estop, sizeof estop);
-    (void)iwc_text(state, "bus.state", bus, sizeof bus);
-    const iwc_value_t holder = iwc_integer(state, "lease.holder");
-    (void)snprintf(out, size, "%s %s %s %s %lld %d%d", machine, cause, estop, bus, (long long)holder.value,
-                   iwc_truth(state, "left.heard").value == 1, iwc_truth(state, "right.heard").value == 1);
+    iwc_cursor_t cursor = {state, NULL}; // In the order of the gateway.
+    const iwc_message_t machine_field = iwc_field(&cursor, "state");
+    const iwc_message_t cause_field = iwc_field(&cursor, "cause");
+    const iwc_message_t lease = iwc_field(&cursor, "lease");
+    const iwc_message_t bus_field = iwc_field(&cursor, "bus");
+    const iwc_message_t estop_field = iwc_field(&cursor, "estop");
+    const iwc_message_t left = iwc_field(&cursor, "left");
+    const iwc_message_t right = iwc_field(&cursor, "right");
+    (void)iwc_text(&machine_field, "", machine, sizeof machine);
+    (void)iwc_text(&cause_field, "", cause, sizeof cause);
+    (void)iwc_text(&estop_field, "state", estop, sizeof estop);
+    (void)iwc_text(&bus_field, "state", bus, sizeof bus);
+    (void)snprintf(out, size, "%s %s %s %s %lld %d%d", machine, cause, estop, bus,
+                   (long long)iwc_integer(&lease, "holder").value, iwc_truth(&left, "heard").value == 1,
+                   iwc_truth(&right, "heard").value == 1);
 }
 
 /// Returns the rate at which the gateway must send its state.
@@ -127,7 +135,7 @@ static uint32_t rate_hz(uint32_t every_ms) {
 static void tell_state(mqtt_bridge_t *self, const iwc_message_t *state, const char *condition, bool spare) {
     // MQTT 5: a state that is older than the next one is useless.
     const mqtt_way_t way = {.spare = spare, .labels = {.expiry_s = self->settings->state.every_ms / 1000U + 1U}};
-    if (mqtt_bridge_publish(self, "state", NULL, mqtt_tell_state(self->boot, state, buffer(self)), way) !=
+    if (mqtt_bridge_publish(self, "state", NULL, mqtt_write_state(self->boot, state, buffer(self)), way) !=
         MQTT_NOT_NOW) {
         (void)snprintf(self->condition, sizeof self->condition, "%s", condition);
         self->state_us = self->now_us;
@@ -185,7 +193,8 @@ static void take_event(void *context, const iwc_message_t *event, uint64_t now_u
         if (strcmp(name, "lease") == 0) {
             take_lease(self, event);
         }
-        const size_t length = mqtt_tell_event(self->boot, self->spool.last + 1U, bridge_wall_us(), event, buffer(self));
+        const size_t length =
+            mqtt_write_event(self->boot, self->spool.last + 1U, bridge_wall_us(), event, buffer(self));
         keep_event(self, name, length, self->spool.mark);
     }
     mqtt_events_send(self);

@@ -8,7 +8,7 @@
 #define MQTT_BRIDGE_H
 
 #include "broker.h"
-#include "mqtt_tell.h"
+#include "mqtt_contents.h"
 #include "spool.h"
 
 #include "common/bridge_link.h"
@@ -51,7 +51,7 @@ typedef struct {
     unsigned losses;                  ///< Number of times in a row that it was the same.
     bool careful;                     ///< The connection ended with events under way; none was confirmed since.
     uint64_t count;                   ///< Messages that were not accepted.
-    uint64_t told;                    ///< Value of `count` in the last log line.
+    uint64_t logged;                  ///< Value of `count` in the last log line.
     uint64_t told_us;                 ///< Time from which the next log line is allowed.
     char last[MQTT_TOPIC_SIZE + 96U]; ///< Topic and reason of the last one; empty: none.
     mqtt_note_t notes[MQTT_NOTES_MAX];

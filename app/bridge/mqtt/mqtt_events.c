@@ -218,12 +218,12 @@ void mqtt_events_begin(mqtt_bridge_t *self) {
 }
 
 void mqtt_events_poll(mqtt_bridge_t *self) {
-    if (self->refusals.count != self->refusals.told && self->now_us >= self->refusals.told_us) {
+    if (self->refusals.count != self->refusals.logged && self->now_us >= self->refusals.told_us) {
         (void)fprintf(stderr,
                       "iwheel-mqtt: messages that the broker did not accept so far: %llu, events set aside: %zu, last "
                       "%s; see the broker's rights for this user and its largest packet\n",
                       (unsigned long long)self->refusals.count, self->spool.aside, self->refusals.last);
-        self->refusals.told = self->refusals.count;
+        self->refusals.logged = self->refusals.count;
         self->refusals.has_event = false;
         self->refusals.told_us = self->now_us + REFUSED_US;
     }

@@ -47,8 +47,8 @@ static void answer(mqtt_bridge_t *self, const mqtt_order_t *order, const iwc_mes
                                        .correlation = (order->correlation_length > 0U) ? order->correlation : NULL,
                                        .correlation_length = order->correlation_length}};
     if (order->to[0] != '\0') {
-        const size_t length = mqtt_tell_answer(self->boot, self->now_us, order, reply,
-                                               (mqtt_buffer_t){self->payload, sizeof self->payload});
+        const size_t length = mqtt_write_answer(self->boot, self->now_us, order, reply,
+                                                (mqtt_buffer_t){self->payload, sizeof self->payload});
         (void)mqtt_bridge_publish(self, "reply", order->to, length, way);
     }
 }

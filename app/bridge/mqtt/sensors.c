@@ -11,7 +11,7 @@ void mqtt_sensors_send(mqtt_bridge_t *self) {
     char topic[MQTT_TOPIC_SIZE];
     size_t i = 0;
     for (; self->settings->home_assistant.enabled &&
-           mqtt_tell_sensor(self->settings, i, topic, (mqtt_buffer_t){self->payload, sizeof self->payload});
+           mqtt_write_sensor(self->settings, i, topic, (mqtt_buffer_t){self->payload, sizeof self->payload});
          i++) {
         (void)mqtt_bridge_publish_to(self, topic, strlen(self->payload), (mqtt_way_t){.qos = 1, .retain = true});
     }
@@ -22,8 +22,9 @@ void mqtt_sensors_send(mqtt_bridge_t *self) {
 
 void mqtt_sensors_take(mqtt_bridge_t *self, const struct mosquitto_message *message) {
     char topic[MQTT_TOPIC_SIZE];
-    for (size_t i = 0; i < self->sensors_sent &&
-                       mqtt_tell_sensor(self->settings, i, topic, (mqtt_buffer_t){self->payload, sizeof self->payload});
+    for (size_t i = 0;
+         i < self->sensors_sent &&
+         mqtt_write_sensor(self->settings, i, topic, (mqtt_buffer_t){self->payload, sizeof self->payload});
          i++) {
         // A retained message is from an earlier time, when the broker may have had other rights.
         if (strcmp(topic, message->topic) == 0 && !message->retain) {

@@ -87,14 +87,14 @@ static natsStatus connect_to(reader_t *self, const mqtt_settings_t *settings, co
 /// Connects to the first host that answers.
 static int find_server(reader_t *self, const mqtt_settings_t *settings, char out_host[MQTT_HOST_SIZE],
                        char out_why[STREAM_WHY_SIZE]) {
-    char told[STREAM_WHY_SIZE / 2U] = "";
+    char causes[STREAM_WHY_SIZE / 2U] = "";
     for (size_t i = 0; mqtt_settings_host(settings, i, out_host); i++) {
         const natsStatus status = connect_to(self, settings, out_host);
         if (status == NATS_OK) {
             return 0;
         }
-        const size_t used = strlen(told);
-        (void)snprintf(told + used, sizeof told - used, "%s%s: %s", (used > 0U) ? ", " : "", out_host,
+        const size_t used = strlen(causes);
+        (void)snprintf(causes + used, sizeof causes - used, "%s%s: %s", (used > 0U) ? ", " : "", out_host,
                        natsStatus_GetText(status));
         end(self);
     }
@@ -102,7 +102,7 @@ static int find_server(reader_t *self, const mqtt_settings_t *settings, char out
         out_why, EX_UNAVAILABLE,
         "no nats-server answers on port %u (%s); check that one runs, and stream_port, ca and certificate under "
         "[broker]",
-        (unsigned)settings->broker.stream_port, told);
+        (unsigned)settings->broker.stream_port, causes);
 }
 
 /// Subscribes with an ephemeral consumer: the servers store nothing for it, and messages are not confirmed.
@@ -131,7 +131,7 @@ static natsStatus count(const reader_t *self, uint64_t *out_events) {
 }
 
 /// Passes one event on; sets `*out_left` to the number of events after it.
-static natsStatus take_one(natsMsg *message, stream_take_t take, void *context, uint64_t *out_left) {
+static natsStatus read_one(natsMsg *message, stream_visit_t visit, void *context, uint64_t *out_left) {
     char topic[TOPIC_SIZE];
     jsMsgMetaData *place = NULL;
     const natsStatus status = natsMsg_GetMetaData(&place, message);
@@ -143,21 +143,21 @@ static natsStatus take_one(natsMsg *message, stream_take_t take, void *context, 
         *dot = '/';
     }
     const char *payload = natsMsg_GetData(message); // NULL: it is empty.
-    const bool goes_on = take(context, topic, (payload != NULL) ? payload : "", (size_t)natsMsg_GetDataLength(message),
-                              place->Timestamp / 1000);
+    const bool goes_on = visit(context, topic, (payload != NULL) ? payload : "", (size_t)natsMsg_GetDataLength(message),
+                               place->Timestamp / 1000);
     *out_left = goes_on ? place->NumPending : 0U;
     jsMsgMetaData_Destroy(place);
     return NATS_OK;
 }
 
-static natsStatus read_all(const reader_t *self, stream_take_t take, void *context) {
+static natsStatus read_all(const reader_t *self, stream_visit_t visit, void *context) {
     uint64_t left = 0;
     natsStatus status = count(self, &left);
     while (status == NATS_OK && left > 0U) {
         natsMsg *message = NULL;
         status = natsSubscription_NextMsg(&message, self->events, SILENCE_MS);
         if (status == NATS_OK) {
-            status = take_one(message, take, context, &left);
+            status = read_one(message, visit, context, &left);
         }
         natsMsg_Destroy(message);
     }
@@ -165,12 +165,12 @@ static natsStatus read_all(const reader_t *self, stream_take_t take, void *conte
 }
 
 /// Tries once to read. `*trouble` is the error code of the servers, if they sent one.
-static natsStatus try_to_read(reader_t *self, const stream_config_t *config, stream_take_t take, void *context,
+static natsStatus try_to_read(reader_t *self, const stream_config_t *config, stream_visit_t visit, void *context,
                               jsErrCode *trouble) {
     const char *words = NULL;
     natsStatus status = subscribe(self, config, trouble);
     if (status == NATS_OK) {
-        status = read_all(self, take, context);
+        status = read_all(self, visit, context);
     }
     const bool forbidden =
         status != NATS_OK && natsConnection_GetLastError(self->connection, &words) == NATS_NOT_PERMITTED;
@@ -179,7 +179,7 @@ static natsStatus try_to_read(reader_t *self, const stream_config_t *config, str
 
 /// Counts the events that are passed on: a read that has passed on events is not repeated.
 typedef struct {
-    stream_take_t take;
+    stream_visit_t visit;
     void *context;
     uint64_t events;
 } counted_t;
@@ -187,7 +187,7 @@ typedef struct {
 static bool take_counted(void *context, const char *topic, const char *payload, size_t length, int64_t stored_us) {
     counted_t *self = context;
     self->events++;
-    return self->take(self->context, topic, payload, length, stored_us);
+    return self->visit(self->context, topic, payload, length, stored_us);
 }
 
 /// Returns true for a temporary error: servers that have just lost one of them still ask it for a while.
@@ -198,7 +198,7 @@ static bool may_pass(natsStatus status, jsErrCode trouble) {
 int stream_read(const mqtt_settings_t *settings, const stream_config_t *config, char out_host[MQTT_HOST_SIZE],
                 char out_why[STREAM_WHY_SIZE]) {
     reader_t reader = {.options = NULL};
-    counted_t counted = {config->take, config->context, 0};
+    counted_t counted = {config->visit, config->context, 0};
     jsErrCode trouble = 0;
     natsStatus status = NATS_ERR;
     if (settings->broker.stream_port == 0U) {

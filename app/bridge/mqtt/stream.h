@@ -16,7 +16,7 @@
 
 /// Receives one event: its topic and payload, and the wall clock of the servers at its storage. Returns false to end
 /// the reading.
-typedef bool (*stream_take_t)(void *context, const char *topic, const char *payload, size_t length, int64_t stored_us);
+typedef bool (*stream_visit_t)(void *context, const char *topic, const char *payload, size_t length, int64_t stored_us);
 
 /// Selection of events, and their receiver.
 typedef struct {
@@ -24,8 +24,8 @@ typedef struct {
     const char *event;   ///< NULL: all events.
     bool last;           ///< Only the last event of each machine and kind.
     int64_t since_us; ///< Time of storage from which on events are read, by the clock of the servers; not with `last`.
-    stream_take_t take;
-    void *context; ///< Context of `take`.
+    stream_visit_t visit;
+    void *context; ///< Context of `visit`.
 } stream_config_t;
 
 /// Reads the stored events in the order of their storage. Returns 0 and sets `out_host` to the host that served;

@@ -124,11 +124,11 @@ iwc_result_t bridge_call(bridge_t *self) {
 
 static void take_stop(bridge_t *self, const iwc_message_t *event) {
     const bool ours = iwc_integer(event, "client").value == iwc_number(self->gateway);
-    const bool silence =
+    const bool was_silent =
         iwc_is(event, "cause", "lease_lost") || (self->silenced && iwc_is(event, "cause", "client_stop"));
     (void)iwc_text(event, "sentence", self->facts.machine.stop, sizeof self->facts.machine.stop);
     self->facts.machine.stop_number = iwc_integer(event, "number");
-    ros_auto_stopped(&self->auto_arm, ours && silence && event->skipped == 0);
+    ros_auto_stopped(&self->auto_arm, ours && was_silent && event->skipped == 0);
     self->silenced = false;
     self->commanded_us = 0;
     bridge_end_lease(self);

@@ -75,8 +75,8 @@ static struct ddsi_serdata *data_from_parts(const struct ddsi_sertype *type, enu
     }
     data->raw.size = size;
     for (size_t i = 0; i < (size_t)count && at < ROS_RAW_MAX; i++) {
-        const size_t room = ROS_RAW_MAX - at;
-        const size_t length = (parts[i].iov_len < room) ? parts[i].iov_len : room;
+        const size_t space = ROS_RAW_MAX - at;
+        const size_t length = (parts[i].iov_len < space) ? parts[i].iov_len : space;
         memcpy(data->raw.bytes + at, parts[i].iov_base, length);
         at += length;
     }

@@ -300,7 +300,7 @@ bool ros_take_command(ros_t *self, unsigned reader, ros_command_t *out_command) 
     const bool is_stamped = reader == 1U;
     void *sample = NULL;
     dds_sample_info_t info;
-    bool taken = false;
+    bool accepted = false;
     while (self->commands[reader] > 0 && dds_take(self->commands[reader], &sample, &info, 1, 1) == 1) {
         if (info.valid_data) {
             const geometry_msgs_msg_dds__TwistStamped_ *stamped = sample;
@@ -309,12 +309,12 @@ bool ros_take_command(ros_t *self, unsigned reader, ros_command_t *out_command) 
             out_command->stamp_us = is_stamped ? time_of(&stamped->header.stamp) : 0;
             copy(&plain->linear, out_command->linear);
             copy(&plain->angular, out_command->angular);
-            taken = true;
+            accepted = true;
         }
         (void)dds_return_loan(self->commands[reader], &sample, 1);
         sample = NULL;
     }
-    return taken;
+    return accepted;
 }
 
 unsigned ros_publishers(const ros_t *self) {

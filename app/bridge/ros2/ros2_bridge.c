@@ -161,7 +161,7 @@ static void show_estop(bridge_t *self) {
     }
 }
 
-static void tell(bridge_t *self, int64_t now) {
+static void publish_facts(bridge_t *self, int64_t now) {
     char state[sizeof self->state];
     ros_status_t statuses[ROS_TELLS];
     ros_state_json(&self->facts, state, sizeof state);
@@ -206,7 +206,7 @@ void bridge_step(bridge_t *self) {
     if (self->facts.link == ROS_LINK_UP && now - self->received_us > SILENT_US) {
         self->facts.link = ROS_LINK_SILENT;
     }
-    tell(self, now);
+    publish_facts(self, now);
     (void)pthread_mutex_unlock(&self->lock);
 }
 

@@ -101,11 +101,11 @@ ssize_t recvmsg(int fd, struct msghdr *message, int flags) {
     if (came <= 0 || message->msg_iovlen != 1 || (message->msg_flags & MSG_TRUNC) != 0) {
         return came;
     }
-    const struct iovec *room = &message->msg_iov[0];
-    rtps_drop_large_data(room->iov_base, (size_t)came);
+    const struct iovec *buffer = &message->msg_iov[0];
+    rtps_drop_large_data(buffer->iov_base, (size_t)came);
     (void)pthread_mutex_lock(&in.lock);
     const size_t length =
-        rtps_await_firsts(&in.firsts, (int64_t)bridge_now_us(), room->iov_base, (size_t)came, room->iov_len);
+        rtps_await_firsts(&in.firsts, (int64_t)bridge_now_us(), buffer->iov_base, (size_t)came, buffer->iov_len);
     (void)pthread_mutex_unlock(&in.lock);
     return (ssize_t)length;
 }
@@ -197,11 +197,11 @@ static bool take_service(ros_t *self, ros_verb_t verb, ros_request_t *out_reques
 static bool take_ask(ros_t *self, ros_request_t *out_request) {
     void *sample = NULL;
     dds_sample_info_t info;
-    bool taken = false;
-    while (!taken && dds_take(self->asks, &sample, &info, 1, 1) == 1) {
+    bool accepted = false;
+    while (!accepted && dds_take(self->asks, &sample, &info, 1, 1) == 1) {
         const std_msgs_msg_dds__String_ *text = sample;
-        for (unsigned verb = 0; verb < ROS_VERBS && info.valid_data && !taken; verb++) {
-            taken = strcmp(text->data, verbs[verb]) == 0;
+        for (unsigned verb = 0; verb < ROS_VERBS && info.valid_data && !accepted; verb++) {
+            accepted = strcmp(text->data, verbs[verb]) == 0;
             *out_request = (ros_request_t){.verb = (ros_verb_t)verb, .by_topic = true};
             out_request->source = info.publication_handle;
             out_request->sent_us = info.source_timestamp / 1000;
@@ -209,7 +209,7 @@ static bool take_ask(ros_t *self, ros_request_t *out_request) {
         (void)dds_return_loan(self->asks, &sample, 1);
         sample = NULL;
     }
-    return taken;
+    return accepted;
 }
 
 bool ros_take_request(ros_t *self, ros_request_t *out_request) {

@@ -65,8 +65,8 @@ size_t ros_service_write(const ros_caller_t *caller, bool success, const char *t
     memset(out + used, 0, ALIGNED);
     out[used] = success ? 1U : 0U;
     used += ALIGNED;
-    const size_t room = size - used - sizeof(uint32_t) - ALIGNED;
-    const size_t length = strnlen(text, room - 1U);
+    const size_t space = size - used - sizeof(uint32_t) - ALIGNED;
+    const size_t length = strnlen(text, space - 1U);
     rtps_write((uint32_t)length + 1U, sizeof(uint32_t), true, out + used);
     used += sizeof(uint32_t);
     memset(out + used, 0, length + ALIGNED);

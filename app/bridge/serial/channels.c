@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "relay.h"
 
-#include "iwheel_northbound/tell.h"
+#include "iwheel_northbound/contents.h"
 
 #include <inttypes.h>
 #include <stdio.h>
@@ -180,7 +180,7 @@ static void pass_reply(relay_t *self, sock_client_t *owner, const serial_request
     if (client == NULL) {
         return;
     }
-    iwn_out_t json = iwn_tell_reply(self->clients.line, sizeof self->clients.line, &request->id, request->ok);
+    iwn_out_t json = iwn_write_reply(self->clients.line, sizeof self->clients.line, &request->id, request->ok);
     if (length + 1U < json.size - json.length) {
         memcpy(&json.data[json.length], rest, length);
         json.data[json.length + length] = '\n';

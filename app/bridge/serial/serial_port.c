@@ -68,7 +68,7 @@ static long holder_of(const char *path) {
 }
 
 static int complain(const char *path, int error, char *out_why, size_t size) {
-    const char *cure = "choose another with [board] port";
+    const char *fix = "choose another with [board] port";
     if (error == EBUSY || error == EWOULDBLOCK) {
         const long pid = holder_of(path);
         char name[32] = "another program";
@@ -76,17 +76,17 @@ static int complain(const char *path, int error, char *out_why, size_t size) {
             (void)snprintf(name, sizeof name, "process %ld", pid);
         }
         (void)snprintf(out_why, size, "%s already uses %s, and two relays cannot share a port; end that one, or %s",
-                       name, path, cure);
+                       name, path, fix);
         return EBUSY;
     }
     if (error == EACCES || error == EPERM) {
-        cure = "run as a user in its group: usermod -aG dialout USER";
+        fix = "run as a user in its group: usermod -aG dialout USER";
     } else if (error == ENOENT || error == ENXIO || error == ENODEV) {
-        cure = "plug the board in, or name its port with [board] port (ls /dev/serial/by-id)";
+        fix = "plug the board in, or name its port with [board] port (ls /dev/serial/by-id)";
     } else if (error == ENOTTY) {
-        cure = "it is not a serial port; name one with [board] port (ls /dev/serial/by-id)";
+        fix = "it is not a serial port; name one with [board] port (ls /dev/serial/by-id)";
     }
-    (void)snprintf(out_why, size, "port %s: %s; %s", path, strerror(error), cure);
+    (void)snprintf(out_why, size, "port %s: %s; %s", path, strerror(error), fix);
     return error;
 }
 

@@ -54,9 +54,9 @@ void ctl_explain_assumptions(json_t *assumptions) {
 static void print_item(const paper_t *paper, const char *label, tone_t tone, const char *name, const json_t *entry) {
     char line[LINE];
     const char *disabled = json_string_value(json_object_get(entry, "disabled"));
-    const bool told = json_object_get(entry, "value") != NULL; // The snapshot of a board does not have all values.
-    (void)snprintf(line, sizeof line, "%.64s%s%.64s: %.256s", name, told ? " = " : "",
-                   told ? text_word(entry, "value") : "", text_word(entry, "reason"));
+    const bool known = json_object_get(entry, "value") != NULL; // The snapshot of a board does not have all values.
+    (void)snprintf(line, sizeof line, "%.64s%s%.64s: %.256s", name, known ? " = " : "",
+                   known ? text_word(entry, "value") : "", text_word(entry, "reason"));
     paper_wrap(paper, label, tone, line);
     if (disabled != NULL) {
         (void)snprintf(line, sizeof line, "disabled: %.256s", disabled);

@@ -50,13 +50,13 @@ static int finish(ctl_t *self, int code, json_t *reply) {
     return code;
 }
 
-static int ask_and_tell_state(ctl_t *self, json_t *request) {
+static int ask_and_report_state(ctl_t *self, json_t *request) {
     json_t *reply = NULL;
     const int code = ctl_ask(self, request, &reply);
     return finish(self, code, reply);
 }
 
-static int stop_and_tell_state(ctl_t *self, const ctl_stop_t *stop) {
+static int stop_and_report_state(ctl_t *self, const ctl_stop_t *stop) {
     json_t *reply = NULL;
     const int code = ctl_stop(self, stop, &reply);
     return finish(self, code, reply);
@@ -66,7 +66,7 @@ int verb_stop(ctl_t *self, int count, char **words) {
     if (!words_at_most("stop", count, 0, words)) {
         return CTL_USAGE;
     }
-    return stop_and_tell_state(self, &(ctl_stop_t){.latches = false});
+    return stop_and_report_state(self, &(ctl_stop_t){.latches = false});
 }
 
 int verb_estop(ctl_t *self, int count, char **words) {
@@ -75,21 +75,21 @@ int verb_estop(ctl_t *self, int count, char **words) {
     for (int i = 0; i < count; i++) {
         IWN_TEXT_JOIN(&text, (i > 0) ? " " : "", words[i]);
     }
-    return stop_and_tell_state(self, &(ctl_stop_t){.latches = true, .reason = (text.length > 0U) ? reason : NULL});
+    return stop_and_report_state(self, &(ctl_stop_t){.latches = true, .reason = (text.length > 0U) ? reason : NULL});
 }
 
 int verb_reset(ctl_t *self, int count, char **words) {
     if (!words_at_most("reset", count, 0, words)) {
         return CTL_USAGE;
     }
-    return ask_and_tell_state(self, json_pack("{s:s}", "cmd", "reset"));
+    return ask_and_report_state(self, json_pack("{s:s}", "cmd", "reset"));
 }
 
 int verb_release(ctl_t *self, int count, char **words) {
     if (!words_at_most("release", count, 0, words)) {
         return CTL_USAGE;
     }
-    return ask_and_tell_state(self, json_pack("{s:s}", "cmd", "release"));
+    return ask_and_report_state(self, json_pack("{s:s}", "cmd", "release"));
 }
 
 /// Prints the new zero of a wheel, its samples and noise, and the former zero with its source.

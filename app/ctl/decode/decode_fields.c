@@ -12,29 +12,29 @@
 
 typedef struct {
     const char *column; ///< Name for CSV, in the unit of the bus.
-    const char *label;  ///< Name for text.
+    const char *label;  ///< Name for text, with a space.
     const char *unit;
     unsigned digits; ///< Decimals in text.
 } field_words_t;
 
 static const field_words_t words[FIELDS] = {
-    [FIELD_SETPOINT_TYPE] = {"setpoint_type", "type", "", 0},
-    [FIELD_SETPOINT_SPEED] = {"setpoint_speed_mm_s", "speed", "mm/s", 0},
-    [FIELD_SETPOINT_CURRENT] = {"setpoint_current_mA", "current", "mA", 0},
+    [FIELD_SETPOINT_TYPE] = {"setpoint_type", "type ", "", 0},
+    [FIELD_SETPOINT_SPEED] = {"setpoint_speed_mm_s", "speed ", "mm/s", 0},
+    [FIELD_SETPOINT_CURRENT] = {"setpoint_current_mA", "current ", "mA", 0},
     [FIELD_SPEED] = {"speed_rpm", "", "rpm", 0},
-    [FIELD_ACCELERATION] = {"acceleration_raw", "acceleration", "(unit unknown)", 0},
-    [FIELD_BATTERY] = {"battery_dV", "battery", "V", 1},
-    [FIELD_TEMPERATURE] = {"temperature_degC", "temperature", "degC", 0},
-    [FIELD_ODOMETRY] = {"odometry_ticks", "odometry", "ticks", 0},
-    [FIELD_CPU] = {"cpu_percent", "CPU", "%", 0},
-    [FIELD_POSE_X] = {"pose_x_mm", "x", "mm", 0},
-    [FIELD_POSE_Y] = {"pose_y_mm", "y", "mm", 0},
-    [FIELD_POSE_Z] = {"pose_z_mm", "z", "mm", 0},
-    [FIELD_POSE_PSI] = {"pose_psi_mrad", "psi", "mrad", 0},
-    [FIELD_FORCE_RAW] = {"force_raw", "raw", "", 0},
-    [FIELD_FORCE] = {"force_with_offset_mN", "force with offset", "N", 3},
-    [FIELD_FORCE_DEBUG] = {"force_debug_raw", "debug", "", 0},
-    [FIELD_OFFSET] = {"force_offset_dN", "force offset", "N", 1},
+    [FIELD_ACCELERATION] = {"acceleration_raw", "acceleration ", "(unit unknown)", 0},
+    [FIELD_BATTERY] = {"battery_dV", "battery ", "V", 1},
+    [FIELD_TEMPERATURE] = {"temperature_degC", "temperature ", "degC", 0},
+    [FIELD_ODOMETRY] = {"odometry_ticks", "odometry ", "ticks", 0},
+    [FIELD_CPU] = {"cpu_percent", "CPU ", "%", 0},
+    [FIELD_POSE_X] = {"pose_x_mm", "x ", "mm", 0},
+    [FIELD_POSE_Y] = {"pose_y_mm", "y ", "mm", 0},
+    [FIELD_POSE_Z] = {"pose_z_mm", "z ", "mm", 0},
+    [FIELD_POSE_PSI] = {"pose_psi_mrad", "psi ", "mrad", 0},
+    [FIELD_FORCE_RAW] = {"force_raw", "raw ", "", 0},
+    [FIELD_FORCE] = {"force_with_offset_mN", "force with offset ", "N", 3},
+    [FIELD_FORCE_DEBUG] = {"force_debug_raw", "debug ", "", 0},
+    [FIELD_OFFSET] = {"force_offset_dN", "force offset ", "N", 1},
 };
 
 static void put(decoded_t *out, field_t field, int32_t value) {
@@ -63,40 +63,40 @@ static void put_force(const iw_codec_force_t *force, iw_force_unit_t unit, decod
     out->note = (force->force_raw == INT16_MIN || force->force_raw == INT16_MAX) ? SATURATED_NOTE : "";
 }
 
-static void put_message(iw_codec_kind_t kind, const iw_codec_wheel_t *told, iw_force_unit_t unit, decoded_t *out) {
+static void put_message(iw_codec_kind_t kind, const iw_codec_wheel_t *values, iw_force_unit_t unit, decoded_t *out) {
     switch (kind) {
     case IW_CODEC_SETPOINT:
-        put(out, FIELD_SETPOINT_TYPE, told->setpoint.type);
-        put(out, FIELD_SETPOINT_SPEED, told->setpoint.speed_mm_s);
-        put(out, FIELD_SETPOINT_CURRENT, told->setpoint.current_mA);
+        put(out, FIELD_SETPOINT_TYPE, values->setpoint.type);
+        put(out, FIELD_SETPOINT_SPEED, values->setpoint.speed_mm_s);
+        put(out, FIELD_SETPOINT_CURRENT, values->setpoint.current_mA);
         break;
     case IW_CODEC_SPEED:
-        put(out, FIELD_SPEED, told->speed.speed_rpm);
-        put(out, FIELD_ACCELERATION, told->speed.acceleration_raw);
+        put(out, FIELD_SPEED, values->speed.speed_rpm);
+        put(out, FIELD_ACCELERATION, values->speed.acceleration_raw);
         break;
     case IW_CODEC_STATUS:
-        put_status(&told->status, out);
+        put_status(&values->status, out);
         break;
     case IW_CODEC_POSE:
-        put(out, FIELD_POSE_X, told->pose.x_mm);
-        put(out, FIELD_POSE_Y, told->pose.y_mm);
-        put(out, FIELD_POSE_Z, told->pose.z_mm);
-        put(out, FIELD_POSE_PSI, told->pose.psi_mrad);
+        put(out, FIELD_POSE_X, values->pose.x_mm);
+        put(out, FIELD_POSE_Y, values->pose.y_mm);
+        put(out, FIELD_POSE_Z, values->pose.z_mm);
+        put(out, FIELD_POSE_PSI, values->pose.psi_mrad);
         break;
     case IW_CODEC_FORCE:
-        put_force(&told->force, unit, out);
+        put_force(&values->force, unit, out);
         break;
     case IW_CODEC_OFFSET:
     default:
-        put(out, FIELD_OFFSET, told->offset.offset_dN);
+        put(out, FIELD_OFFSET, values->offset.offset_dN);
         break;
     }
 }
 
 void decode_fields(const iw_can_frame_t *frame, const iw_config_t *config, decoded_t *out) {
-    iw_codec_wheel_t told[IW_SIDES];
+    iw_codec_wheel_t values[IW_SIDES];
     const iw_side_t side = iw_codec_side(frame->id);
-    const iw_codec_kind_t kind = iw_codec_decode(frame, told);
+    const iw_codec_kind_t kind = iw_codec_decode(frame, values);
     *out = (decoded_t){.message = "unknown", .wheel = "", .note = ""};
     switch (kind) {
     case IW_CODEC_UNKNOWN:
@@ -115,7 +115,7 @@ void decode_fields(const iw_can_frame_t *frame, const iw_config_t *config, decod
     default:
         out->message = iw_codec_name(kind);
         out->wheel = text_side(side);
-        put_message(kind, &told[side], config->force_unit[side], out);
+        put_message(kind, &values[side], config->force_unit[side], out);
         break;
     }
     if ((frame->id & IW_CAN_ERROR) != 0U) {
@@ -133,9 +133,9 @@ void field_add_all(const decoded_t *decoded, iwn_text_t *line) {
     for (unsigned field = 0; field < FIELDS; field++) {
         if ((decoded->present & (1U << field)) != 0U) {
             const field_words_t *word = &words[field];
-            char number[TEXT_CELL];
-            text_number(decoded->value[field], word->digits, word->unit, number);
-            IWN_TEXT_JOIN(line, gap, word->label, (word->label[0] == '\0') ? "" : " ", number);
+            iwn_text_add(line, gap);
+            iwn_text_add(line, word->label);
+            text_add_number(decoded->value[field], word->digits, word->unit, line);
             gap = ", ";
         }
     }

@@ -17,7 +17,7 @@ typedef struct {
     gateway_config_t config; ///< Values of the file, or the defaults.
     near_gateway_t gateway;
     inspect_findings_t findings;
-    inspect_heard_t heard;
+    inspect_traffic_t traffic;
     iwl_hal_t hal;
     bool open; ///< `hal` is open.
     unsigned listen_ms;

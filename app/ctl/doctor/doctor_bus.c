@@ -28,7 +28,7 @@ static void say_contradicted(doctor_t *self, const char *name, const json_t *ent
                 "assumption %s is contradicted: %s%s", name, text_word(entry, "reason"),
                 tared ? "; the tare has resolved it" : "");
     if (!tared) {
-        inspect_cure(&self->findings, "%s", inspect_assumption_cure(item));
+        inspect_fix(&self->findings, "%s", inspect_assumption_fix(item));
     }
 }
 
@@ -62,20 +62,20 @@ static void list_unset(doctor_t *self) {
         if (advice_is_unset(self->gateway.status, needed[i].item)) {
             inspect_say(&self->findings, "config", INSPECT_WARN, "%s not configured: the gateway refuses arm",
                         needed[i].key);
-            inspect_cure(&self->findings,
-                         "set it under [wheels] in the configuration; if it is unknown: iwheelctl bringup finds it");
+            inspect_fix(&self->findings,
+                        "set it under [wheels] in the configuration; if it is unknown: iwheelctl bringup finds it");
         }
     }
 }
 
 /// Reports a setpoint that no node acknowledges: arm is refused because of it, and it may be sent late.
 static void judge_sending(doctor_t *self) {
-    char cure[ADVICE_SIZE];
+    char fix[ADVICE_SIZE];
     if (advice_is_present(self->gateway.status, "send_stalled")) {
         inspect_say(&self->findings, "send_stalled", INSPECT_FAIL,
                     "a setpoint of the gateway is not acknowledged on the bus");
-        (void)advice_cure(self->gateway.status, "send_stalled", cure);
-        inspect_cure(&self->findings, "%s", cure);
+        (void)advice_fix(self->gateway.status, "send_stalled", fix);
+        inspect_fix(&self->findings, "%s", fix);
     }
 }
 
@@ -88,13 +88,13 @@ static void look_at_status(doctor_t *self) {
                 text_word(status, "version"), self->gateway.path, self->gateway.bus, state, latched ? ", " : "",
                 latched ? text_word(status, "cause") : "");
     if (latched) {
-        inspect_cure(findings, "iwheelctl why prints the cause; when it is gone: iwheelctl reset");
+        inspect_fix(findings, "iwheelctl why prints the cause; when it is gone: iwheelctl reset");
     }
     judge_sending(self);
     if (advice_is_present(status, "second_master")) {
         inspect_say(findings, "second_master", INSPECT_FAIL,
                     "the gateway receives setpoints of another sender, id 266 (0x10A) or 298 (0x12A)");
-        inspect_cure(findings, "switch off the other program or device that sends them");
+        inspect_fix(findings, "switch off the other program or device that sends them");
     }
     if (!json_is_true(json_object_get(status, "listen_only"))) {
         list_unset(self);
@@ -103,11 +103,11 @@ static void look_at_status(doctor_t *self) {
 }
 
 /// Suggests the group whose members may use the socket (or its directory).
-static void cure_denied(doctor_t *self) {
+static void fix_denied(doctor_t *self) {
     struct stat status;
     const struct group *group = (stat(self->gateway.path, &status) == 0) ? getgrgid(status.st_gid) : NULL;
-    inspect_cure(&self->findings, "sudo usermod -aG %s $USER, then log in again",
-                 (group != NULL) ? group->gr_name : "iwheel");
+    inspect_fix(&self->findings, "sudo usermod -aG %s $USER, then log in again",
+                (group != NULL) ? group->gr_name : "iwheel");
 }
 
 void doctor_look_at_gateway(doctor_t *self) {
@@ -123,12 +123,12 @@ void doctor_look_at_gateway(doctor_t *self) {
         break;
     case NEAR_DENIED:
         inspect_say(findings, "gateway", INSPECT_FAIL, "gateway at %s: you may not use it", path);
-        cure_denied(self);
+        fix_denied(self);
         break;
     case NEAR_MUTE:
         inspect_say(findings, "gateway", INSPECT_FAIL, "gateway at %s: it accepts the connection and does not answer",
                     path);
-        inspect_cure(findings, "see its log: journalctl -u iwheel-gateway; then: systemctl restart iwheel-gateway");
+        inspect_fix(findings, "see its log: journalctl -u iwheel-gateway; then: systemctl restart iwheel-gateway");
         break;
     case NEAR_SEVERAL:
         inspect_say(findings, "gateway", INSPECT_OK, "several gateways are running: %s", path);
@@ -177,11 +177,11 @@ static void hear_gateway(doctor_t *self) {
     for (unsigned i = IW_BUS_OFF; i <= (unsigned)IW_BUS_PASSIVE; i++) {
         const iw_bus_state_t state = (iw_bus_state_t)i;
         if (strcmp(name, iwn_bus_state_name(state)) == 0) {
-            if (state < self->heard.worst) {
-                self->heard.worst = state;
+            if (state < self->traffic.worst) {
+                self->traffic.worst = state;
             }
-            if (state < self->heard.last) {
-                self->heard.last = state;
+            if (state < self->traffic.last) {
+                self->traffic.last = state;
             }
         }
     }
@@ -220,10 +220,10 @@ void doctor_look_at_bus(doctor_t *self) {
     if (!open_hal(self)) {
         return;
     }
-    inspect_listen(&self->hal, (iw_time_us_t)self->listen_ms * IW_US_PER_MS, &self->heard);
+    inspect_listen(&self->hal, (iw_time_us_t)self->listen_ms * IW_US_PER_MS, &self->traffic);
     hear_gateway(self);
     inspect_link(iwl_hal_link(&self->hal), &config, &self->findings);
-    inspect_bus(iwl_hal_link(&self->hal), &self->heard, &config, &self->findings);
+    inspect_bus(iwl_hal_link(&self->hal), &self->traffic, &config, &self->findings);
     if (has_gateway(self) ||
         (!is_occupied(self) && (strcmp(self->config.estop.line, "none") == 0 || self->hal.estop_ops->present))) {
         const inspect_estop_t estop = doctor_estop(self);

@@ -80,13 +80,12 @@ static void say_no_can(doctor_t *self) {
     (void)snprintf(path, sizeof path, "/lib/modules/%s", kernel.release);
     inspect_say(&self->findings, "kernel", INSPECT_FAIL, "kernel %s: no CAN sockets", kernel.release);
     if (access(path, F_OK) == 0) {
-        inspect_cure(&self->findings,
-                     "modprobe can_raw (and permanently: echo can_raw > /etc/modules-load.d/can.conf)");
+        inspect_fix(&self->findings, "modprobe can_raw (and permanently: echo can_raw > /etc/modules-load.d/can.conf)");
     } else {
-        inspect_cure(&self->findings,
-                     "its modules are not installed (%s is missing): boot a kernel with CAN; without "
-                     "hardware, try the simulator: iwheel-sim --can unix:/tmp/bus",
-                     path);
+        inspect_fix(&self->findings,
+                    "its modules are not installed (%s is missing): boot a kernel with CAN; without "
+                    "hardware, try the simulator: iwheel-sim --can unix:/tmp/bus",
+                    path);
     }
 }
 
@@ -132,15 +131,15 @@ static void look_at_clock(doctor_t *self) {
     if (resolution.tv_nsec > NAP_NS || late_us > LATE_CARE_us) {
         inspect_say(findings, "clock", INSPECT_WARN, "clock: a sleep of 1 ms ended up to %.1f ms late",
                     (double)late_us / 1e3);
-        inspect_cure(findings, "the gateway stops the wheels when it is 100 ms late: reduce this machine's load, or "
-                               "run it with priority: chrt -f 10 iwheel-gateway ...");
+        inspect_fix(findings, "the gateway stops the wheels when it is 100 ms late: reduce this machine's load, or "
+                              "run it with priority: chrt -f 10 iwheel-gateway ...");
     } else {
         inspect_say(findings, "clock", INSPECT_OK, "clock: a sleep of 1 ms ends at most %.1f ms late",
                     (double)late_us / 1e3);
     }
     if (time(NULL) < WALL_MIN_S) {
         inspect_say(findings, "clock", INSPECT_WARN, "wall clock: it is not set; only dates in logs are wrong");
-        inspect_cure(findings, "timedatectl set-ntp true");
+        inspect_fix(findings, "timedatectl set-ntp true");
     } else if (adjtimex(&state) == TIME_ERROR || ((unsigned)state.status & (unsigned)STA_UNSYNC) != 0U) {
         inspect_say(findings, "clock", INSPECT_OK,
                     "wall clock: set, not synchronised; only dates in logs depend on it");
@@ -165,7 +164,7 @@ static void look_at_rights(doctor_t *self) {
     } else {
         inspect_say(&self->findings, "rights", INSPECT_WARN,
                     "rights: you are not in group %s, whose members may use the gateway", group_name);
-        inspect_cure(&self->findings, "sudo usermod -aG %s $USER, then log in again", group_name);
+        inspect_fix(&self->findings, "sudo usermod -aG %s $USER, then log in again", group_name);
     }
 }
 

@@ -78,11 +78,11 @@ static void say_no_bus(doctor_t *self) {
     char names[256];
     if (doctor_interfaces(names, sizeof names) > 0U) {
         inspect_say(&self->findings, "interface", INSPECT_FAIL, "bus: there are several CAN interfaces: %s", names);
-        inspect_cure(&self->findings, "name one: iwheelctl doctor IFACE");
+        inspect_fix(&self->findings, "name one: iwheelctl doctor IFACE");
     } else {
         inspect_say(&self->findings, "interface", INSPECT_FAIL, "bus: this machine has no CAN interface");
-        inspect_cure(&self->findings, "plug the adapter in and load its driver (ip -brief link show type can); without "
-                                      "hardware: iwheel-sim --can unix:/tmp/bus, then: iwheelctl doctor unix:/tmp/bus");
+        inspect_fix(&self->findings, "plug the adapter in and load its driver (ip -brief link show type can); without "
+                                     "hardware: iwheel-sim --can unix:/tmp/bus, then: iwheelctl doctor unix:/tmp/bus");
     }
 }
 
@@ -103,9 +103,9 @@ void doctor_print(const doctor_t *self, unsigned first) {
         const inspect_finding_t *finding = &self->findings.finding[i];
         paper_text(&paper, tones[finding->verdict], INDENT, inspect_verdict_word(finding->verdict));
         print_text(&paper, TONE_PLAIN, finding->text);
-        if (finding->cure[0] != '\0') {
+        if (finding->fix[0] != '\0') {
             // Printed in one line, so that users can copy it.
-            paper_say(&paper, TONE_TITLE, "      -> %s", finding->cure);
+            paper_say(&paper, TONE_TITLE, "      -> %s", finding->fix);
             paper_end(&paper);
         }
     }
@@ -119,27 +119,28 @@ static void print_sum(const doctor_t *self) {
 
 static json_t *rates_of(const doctor_t *self) {
     json_t *rates = json_array();
-    for (unsigned i = 0; i < IW_CODEC_ROWS && self->heard.span_us > 0U; i++) {
+    for (unsigned i = 0; i < IW_CODEC_ROWS && self->traffic.span_us > 0U; i++) {
         const iw_codec_row_t *row = &iw_codec_rows[i];
         (void)json_array_append_new(rates,
                                     json_pack("{s:i,s:s,s:s,s:I,s:I}", "id", (int)row->id, "name",
                                               iw_codec_name((iw_codec_kind_t)row->kind), "side", text_side(row->side),
                                               "nominal_mHz", (json_int_t)inspect_nominal_mHz(row), "measured_mHz",
-                                              (json_int_t)inspect_rate_mHz(&self->heard, i)));
+                                              (json_int_t)inspect_rate_mHz(&self->traffic, i)));
     }
     return rates;
 }
 
 static void print_json(const doctor_t *self) {
     json_t *list = json_array();
-    const bool listened = self->heard.span_us > 0U;
+    const bool listened = self->traffic.span_us > 0U;
     for (unsigned i = 0; i < self->findings.count; i++) {
         const inspect_finding_t *finding = &self->findings.finding[i];
         (void)json_array_append_new(list, json_pack("{s:s,s:s,s:s,s:s?}", "check", finding->check, "verdict",
                                                     inspect_verdict_word(finding->verdict), "text", finding->text,
-                                                    "cure", (finding->cure[0] != '\0') ? finding->cure : NULL));
+                                                    "cure", (finding->fix[0] != '\0') ? finding->fix : NULL));
     }
-    json_t *load = listened ? json_integer(inspect_load_permille(&self->heard, self->config.bus.bitrate)) : json_null();
+    json_t *load =
+        listened ? json_integer(inspect_load_permille(&self->traffic, self->config.bus.bitrate)) : json_null();
     json_t *root = json_pack("{s:b,s:s?,s:b,s:o,s:o,s:o}", "ok", self->findings.total[INSPECT_FAIL] == 0U, "bus",
                              self->bus, "gateway", self->gateway.result == NEAR_FOUND, "findings", list, "rates",
                              rates_of(self), "load_permille", load);
@@ -147,7 +148,7 @@ static void print_json(const doctor_t *self) {
     json_decref(root);
 }
 
-static void look(doctor_t *self, const words_t *words) {
+static void examine(doctor_t *self, const words_t *words) {
     inspect_begin(&self->findings);
     near_look(self->ctl, words->bus, &self->gateway);
     choose_bus(self, words);
@@ -190,10 +191,10 @@ static bool await_level(doctor_t *self, bool pressed, bool *out_skipped) {
 static void say_unseen(doctor_t *self, bool skipped, const char *what) {
     if (skipped) {
         inspect_say(&self->findings, "estop_press", INSPECT_WARN, "e-stop: %s was not tried", what);
-        inspect_cure(&self->findings, "run doctor again and press the button when asked");
+        inspect_fix(&self->findings, "run doctor again and press the button when asked");
     } else {
         inspect_say(&self->findings, "estop_press", INSPECT_FAIL, "e-stop: no %s was seen within 20 s", what);
-        inspect_cure(&self->findings, "check the button's wire, [estop] line and [estop] active");
+        inspect_fix(&self->findings, "check the button's wire, [estop] line and [estop] active");
     }
 }
 
@@ -207,7 +208,7 @@ static void press(doctor_t *self) {
     }
     if (self->gateway.result == NEAR_FOUND && (strcmp(state, "armed") == 0 || strcmp(state, "stopping") == 0)) {
         inspect_say(&self->findings, "estop_press", INSPECT_WARN, "e-stop: not tried, because a client drives");
-        inspect_cure(&self->findings, "iwheelctl stop, then run doctor again");
+        inspect_fix(&self->findings, "iwheelctl stop, then run doctor again");
         return;
     }
     (void)fputs("\nPress the e-stop button now (Enter skips this) ... ", stdout);
@@ -228,7 +229,7 @@ static void press(doctor_t *self) {
     inspect_say(&self->findings, "estop_press", INSPECT_OK, "e-stop: press and release were seen%s",
                 (self->gateway.result == NEAR_FOUND) ? "; the gateway is latched now, as it must be" : "");
     if (self->gateway.result == NEAR_FOUND) {
-        inspect_cure(&self->findings, "iwheelctl reset");
+        inspect_fix(&self->findings, "iwheelctl reset");
     }
 }
 
@@ -244,7 +245,7 @@ int verb_doctor(ctl_t *self, int count, char **words) {
     if (code != CTL_OK) {
         return code;
     }
-    look(&doctor, &parsed);
+    examine(&doctor, &parsed);
     if (self->json) {
         print_json(&doctor);
     } else {

@@ -47,7 +47,7 @@ typedef struct {
     char last_line[512]; ///< With --json: the last reply to a drive command.
 } drive_t;
 
-static void keep(json_t **slot, json_t *snapshot) {
+static void retain(json_t **slot, json_t *snapshot) {
     json_decref(*slot);
     *slot = json_incref(snapshot);
 }
@@ -108,7 +108,7 @@ static end_t take_line(drive_t *self, json_t *line, int64_t now_us) {
     const json_t *ok = json_object_get(line, "ok");
     if (ok == NULL) {
         if (strcmp(text_word(line, "event"), "state") == 0) {
-            keep(&self->latest, line);
+            retain(&self->latest, line);
             show_progress(self, now_us);
         }
         return END_NONE;
@@ -126,7 +126,7 @@ static end_t take_line(drive_t *self, json_t *line, int64_t now_us) {
     }
     if (self->begin_us == 0) {
         self->begin_us = now_us;
-        keep(&self->first, self->latest);
+        retain(&self->first, self->latest);
     }
     self->answered_us = now_us;
     self->limited = self->limited || json_is_true(json_object_get(line, "limited"));
@@ -175,21 +175,21 @@ static end_t run(drive_t *self) {
     return end;
 }
 
-static bool wheel_stands(const json_t *wheel) {
+static bool is_at_standstill(const json_t *wheel) {
     const json_t *applied = json_object_get(wheel, "applied_mm_s");
     const bool zero = json_is_null(applied) || (json_is_integer(applied) && json_integer_value(applied) == 0);
     return zero && json_is_true(json_object_get(wheel, "at_rest"));
 }
 
-static bool both_heard(const json_t *status) {
+static bool both_online(const json_t *status) {
     return json_is_true(json_object_get(json_object_get(status, "left"), "heard")) &&
            json_is_true(json_object_get(json_object_get(status, "right"), "heard"));
 }
 
 static bool both_stand(const json_t *status) {
     const char *state = text_word(status, "state");
-    return strcmp(state, "armed") != 0 && wheel_stands(json_object_get(status, "left")) &&
-           wheel_stands(json_object_get(status, "right"));
+    return strcmp(state, "armed") != 0 && is_at_standstill(json_object_get(status, "left")) &&
+           is_at_standstill(json_object_get(status, "right"));
 }
 
 /// Asks as ctl_ask does, without printing the line of the reply.
@@ -213,13 +213,13 @@ static int wait_for_rest(drive_t *self) {
         if (code != CTL_OK) {
             return code;
         }
-        keep(&self->latest, status);
+        retain(&self->latest, status);
         json_decref(status);
         const int64_t now_us = client_now_us();
         if (both_stand(self->latest) && now_us >= fresh_us) {
             return CTL_OK;
         }
-        if (!both_heard(self->latest) && now_us >= begin_us + UNHEARD_US) {
+        if (!both_online(self->latest) && now_us >= begin_us + UNHEARD_US) {
             return ctl_fail(CTL_NO, "stopped, but a wheel is offline, so it may still turn; see: iwheelctl status");
         }
         if (now_us >= begin_us + REST_US) {
@@ -266,7 +266,7 @@ static void sum_up(const drive_t *self, int64_t stop_us) {
 }
 
 /// Reports the cause of the last stop: a refusal during a drive only reports a consequence of the stop.
-static void tell_why(const drive_t *self) {
+static void report_why(const drive_t *self) {
     json_t *reply = NULL;
     if (ask_quietly(self, json_pack("{s:s}", "cmd", "why"), &reply) == CTL_OK) {
         (void)ctl_fail(CTL_NO, "the last stop: %s", text_word(reply, "sentence"));
@@ -280,7 +280,7 @@ static int judge(const drive_t *self, end_t end, int64_t stop_us) {
         sum_up(self, stop_us);
     }
     if (end == END_REFUSED && self->begin_us > 0) {
-        tell_why(self);
+        report_why(self);
     }
     if (end == END_SILENT) {
         return ctl_fail(CTL_TIMEOUT, "the gateway did not answer a drive command for 1 s; see its log");

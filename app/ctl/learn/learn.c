@@ -167,11 +167,11 @@ static void note_setpoint(learn_setpoint_t *self, const candump_t *frame, const 
 }
 
 /// Notes the answer of the wheel to a speed that was commanded for long enough.
-static void note_answer(learn_wheel_t *self, const iw_codec_setpoint_t *told, int32_t rpm, int64_t for_us) {
-    const int32_t commanded_mm_s = told->speed_mm_s;
+static void note_answer(learn_wheel_t *self, const iw_codec_setpoint_t *setpoint, int32_t rpm, int64_t for_us) {
+    const int32_t commanded_mm_s = setpoint->speed_mm_s;
     learn_answer_t *answer = (commanded_mm_s > 0) ? &self->forward : &self->backward;
     const bool turns = size_of(rpm) > REST_RPM;
-    if (commanded_mm_s == 0 && told->current_mA != 0) {
+    if (commanded_mm_s == 0 && setpoint->current_mA != 0) {
         self->stood_us += turns ? 0 : for_us;
         self->ran_us += turns ? for_us : 0;
     }
@@ -196,9 +196,9 @@ static void note_answer(learn_wheel_t *self, const iw_codec_setpoint_t *told, in
 static void note_speed(learn_wheel_t *self, const learn_setpoint_t *setpoint, int64_t at_us, int32_t rpm) {
     const int64_t gap_us = (self->rpm_us >= 0) ? at_us - self->rpm_us : 0;
     const bool gap = gap_us <= 0 || gap_us >= RPM_GAP_US;
-    const bool told = setpoint->count > 0U && at_us - setpoint->last_us <= (int64_t)IW_WHEEL_WATCHDOG_US;
+    const bool commanded = setpoint->count > 0U && at_us - setpoint->last_us <= (int64_t)IW_WHEEL_WATCHDOG_US;
     self->speeds++;
-    if (told && at_us - setpoint->steady_since_us >= STEADY_US) {
+    if (commanded && at_us - setpoint->steady_since_us >= STEADY_US) {
         note_answer(self, &setpoint->last, rpm, gap ? 0 : gap_us);
     }
     if (!gap) {
@@ -235,10 +235,10 @@ static void note_ticks(learn_wheel_t *self, int64_t at_us, int32_t ticks) {
 
 /// Notes the force. A wheel is at standstill if its speed frames show it, now and for the time REST_US.
 static void note_force(learn_wheel_t *self, int64_t at_us, int16_t raw) {
-    const bool told = self->rpm_us >= 0 && at_us - self->rpm_us < RPM_GAP_US;
+    const bool known = self->rpm_us >= 0 && at_us - self->rpm_us < RPM_GAP_US;
     widen(&self->force, raw);
     self->forces++;
-    if (told && self->rest_since_us >= 0 && at_us - self->rest_since_us >= REST_US) {
+    if (known && self->rest_since_us >= 0 && at_us - self->rest_since_us >= REST_US) {
         self->rest_force_count++;
         self->rest_force_sum += raw;
         widen(&self->rest_force, raw);
@@ -269,36 +269,36 @@ static void note_pose(learn_pose_t *self, int64_t at_us, const uint8_t *data) {
     memcpy(self->last, data, sizeof self->last);
 }
 
-static void note_message(learn_t *self, const candump_t *frame, iw_codec_kind_t kind, const iw_codec_wheel_t *told) {
+static void note_message(learn_t *self, const candump_t *frame, iw_codec_kind_t kind, const iw_codec_wheel_t *values) {
     const iw_side_t side = iw_codec_side(frame->id);
     learn_wheel_t *wheel = &self->wheel[side];
     learn_setpoint_t *setpoint = &self->setpoint[side];
     switch (kind) {
     case IW_CODEC_SETPOINT:
-        note_setpoint(setpoint, frame, &told->setpoint);
+        note_setpoint(setpoint, frame, &values->setpoint);
         break;
     case IW_CODEC_SPEED:
-        note_speed(wheel, setpoint, frame->time_us, told->speed.speed_rpm);
+        note_speed(wheel, setpoint, frame->time_us, values->speed.speed_rpm);
         break;
     case IW_CODEC_STATUS:
-        note_ticks(wheel, frame->time_us, told->status.odometry_ticks);
+        note_ticks(wheel, frame->time_us, values->status.odometry_ticks);
         break;
     case IW_CODEC_POSE:
         note_pose(&self->pose, frame->time_us, frame->data);
         break;
     case IW_CODEC_FORCE:
-        note_force(wheel, frame->time_us, told->force.force_raw);
+        note_force(wheel, frame->time_us, values->force.force_raw);
         break;
     case IW_CODEC_OFFSET:
     default:
         wheel->offsets++;
-        widen(&wheel->offset_dN, told->offset.offset_dN);
+        widen(&wheel->offset_dN, values->offset.offset_dN);
         break;
     }
 }
 
 void learn_frame(learn_t *self, const candump_t *frame) {
-    iw_codec_wheel_t told[IW_SIDES];
+    iw_codec_wheel_t values[IW_SIDES];
     const iw_can_frame_t core = candump_to_core(frame);
     if (self->frames == 0U) {
         self->first_us = frame->time_us;
@@ -310,7 +310,7 @@ void learn_frame(learn_t *self, const candump_t *frame) {
         self->errors++;
         return;
     }
-    const iw_codec_kind_t kind = iw_codec_decode(&core, told);
+    const iw_codec_kind_t kind = iw_codec_decode(&core, values);
     const bool ours = kind < IW_CODEC_KINDS;
     const size_t known = (ours || kind == IW_CODEC_BAD_LENGTH) ? index_of(frame->id) : LEARN_IDS;
     learn_id_t *id = (known < LEARN_IDS) ? &self->known[known] : NULL;
@@ -323,6 +323,6 @@ void learn_frame(learn_t *self, const candump_t *frame) {
         note_id(id, frame);
     }
     if (ours) {
-        note_message(self, frame, kind, &told[iw_codec_side(frame->id)]);
+        note_message(self, frame, kind, &values[iw_codec_side(frame->id)]);
     }
 }

@@ -33,9 +33,9 @@ static bool is_recent(int64_t then_us, int64_t now_us, int64_t span_us) {
 }
 
 static bool has_ended(const learn_drives_t *self, int64_t now_us) {
-    const bool told =
+    const bool values =
         is_recent(self->told_us[IW_LEFT], now_us, ENDED_US) || is_recent(self->told_us[IW_RIGHT], now_us, ENDED_US);
-    return !told || !is_recent(self->moved_us, now_us, ENDED_US);
+    return !values || !is_recent(self->moved_us, now_us, ENDED_US);
 }
 
 /// Compares up to `now_us` if both wheels had setpoints and speed frames all the time since the last frame.
@@ -61,7 +61,7 @@ static void compare(learn_drives_t *self, int64_t now_us) {
 }
 
 /// Notes a setpoint. `applied_mm_s` is in the machine's sense of direction, as measured speeds are.
-static void tell(learn_drives_t *self, size_t side, int32_t speed_mm_s, int64_t now_us) {
+static void note_setpoint(learn_drives_t *self, size_t side, int32_t speed_mm_s, int64_t now_us) {
     self->pair.applied_mm_s[side] = self->config->invert[side] ? -speed_mm_s : speed_mm_s;
     self->told_us[side] = now_us;
     learn_lag_tell(&self->lag[side], now_us, speed_mm_s);
@@ -79,7 +79,7 @@ static void tell(learn_drives_t *self, size_t side, int32_t speed_mm_s, int64_t 
     last_drive(self)->end_us = now_us;
 }
 
-static void hear(learn_drives_t *self, size_t side, int32_t rpm, int64_t now_us) {
+static void note_speed(learn_drives_t *self, size_t side, int32_t rpm, int64_t now_us) {
     const int32_t speed_um_s = rpm * self->pair.um_s_per_rpm;
     learn_lag_receive(&self->lag[side], now_us, speed_um_s / 1e3);
     iw_diverge_receive(&self->pair, side, (self->config->invert[side] ? -speed_um_s : speed_um_s) / 1000);
@@ -87,9 +87,9 @@ static void hear(learn_drives_t *self, size_t side, int32_t rpm, int64_t now_us)
 }
 
 void learn_drives_frame(learn_drives_t *self, const candump_t *frame) {
-    iw_codec_wheel_t told[IW_SIDES];
+    iw_codec_wheel_t values[IW_SIDES];
     const iw_can_frame_t core = candump_to_core(frame);
-    const iw_codec_kind_t kind = frame->error ? IW_CODEC_UNKNOWN : iw_codec_decode(&core, told);
+    const iw_codec_kind_t kind = frame->error ? IW_CODEC_UNKNOWN : iw_codec_decode(&core, values);
     if (kind != IW_CODEC_SETPOINT && kind != IW_CODEC_SPEED) {
         return;
     }
@@ -101,9 +101,9 @@ void learn_drives_frame(learn_drives_t *self, const candump_t *frame) {
         compare(self, frame->time_us);
     }
     if (kind == IW_CODEC_SETPOINT) {
-        tell(self, side, told[side].setpoint.speed_mm_s, frame->time_us);
+        note_setpoint(self, side, values[side].setpoint.speed_mm_s, frame->time_us);
     } else {
-        hear(self, side, told[side].speed.speed_rpm, frame->time_us);
+        note_speed(self, side, values[side].speed.speed_rpm, frame->time_us);
     }
     self->last_us = frame->time_us;
 }

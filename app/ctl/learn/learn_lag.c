@@ -23,7 +23,7 @@
 
 void learn_lag_init(learn_lag_t *self) {
     memset(self, 0, sizeof *self);
-    self->told_us = self->measured_us = -1;
+    self->commanded_us = self->measured_us = -1;
 }
 
 /// Discards the state of the wheel: it is not known.
@@ -33,7 +33,7 @@ static void forget(learn_lag_t *self) {
     self->settled_mm = 0;
 }
 
-static void take(learn_lag_t *self, double lag_ms) {
+static void add_lag(learn_lag_t *self, double lag_ms) {
     if (self->count == 0U || lag_ms < self->least_ms) {
         self->least_ms = lag_ms;
     }
@@ -46,11 +46,11 @@ static void take(learn_lag_t *self, double lag_ms) {
 
 /// Ends a change: the wheel has a steady speed again.
 static void end_change(learn_lag_t *self) {
-    const double told = self->commanded_mm_s - self->before_told;
+    const double commanded = self->commanded_mm_s - self->before_mm_s;
     const double measured = self->settled_mm / ((double)self->settled_us / 1e6) - self->before;
     self->changing = false;
-    if (fabs(told) >= CHANGE_MIN_MM_S && measured / told > 0.5 && measured / told < 2.0) {
-        take(self, (self->way_told_mm / told - self->way_mm / measured) * 1000.0);
+    if (fabs(commanded) >= CHANGE_MIN_MM_S && measured / commanded > 0.5 && measured / commanded < 2.0) {
+        add_lag(self, (self->way_commanded_mm / commanded - self->way_mm / measured) * 1000.0);
     }
 }
 
@@ -59,7 +59,7 @@ static void pass(learn_lag_t *self, int64_t from_us, int64_t to_us, double measu
     const double span_s = (double)(to_us - from_us) / 1e6;
     const double way_mm = (self->measured_mm_s + measured_mm_s) / 2.0 * span_s;
     if (self->changing) {
-        self->way_told_mm += (self->commanded_mm_s - self->before_told) * span_s;
+        self->way_commanded_mm += (self->commanded_mm_s - self->before_mm_s) * span_s;
         self->way_mm += way_mm - self->before * span_s;
     }
     if (from_us - self->constant_us >= SETTLE_US) {
@@ -73,8 +73,8 @@ static void pass(learn_lag_t *self, int64_t from_us, int64_t to_us, double measu
 
 void learn_lag_receive(learn_lag_t *self, int64_t at_us, double speed_mm_s) {
     const int64_t gap_us = at_us - self->measured_us;
-    const bool told = self->told_us >= 0 && at_us - self->told_us <= (int64_t)IW_WHEEL_WATCHDOG_US;
-    if (self->measured_us < 0 || gap_us < 0 || gap_us > GAP_US || !told) {
+    const bool known = self->commanded_us >= 0 && at_us - self->commanded_us <= (int64_t)IW_WHEEL_WATCHDOG_US;
+    if (self->measured_us < 0 || gap_us < 0 || gap_us > GAP_US || !known) {
         forget(self);
     } else {
         pass(self, self->measured_us, at_us, speed_mm_s);
@@ -84,8 +84,8 @@ void learn_lag_receive(learn_lag_t *self, int64_t at_us, double speed_mm_s) {
 }
 
 void learn_lag_tell(learn_lag_t *self, int64_t at_us, int32_t speed_mm_s) {
-    const bool first = self->told_us < 0 || at_us < self->told_us;
-    self->told_us = at_us;
+    const bool first = self->commanded_us < 0 || at_us < self->commanded_us;
+    self->commanded_us = at_us;
     if (!first && speed_mm_s == self->commanded_mm_s) {
         return;
     }
@@ -95,9 +95,9 @@ void learn_lag_tell(learn_lag_t *self, int64_t at_us, int32_t speed_mm_s) {
     }
     if (!self->changing && self->settled_us >= SETTLE_US) {
         self->changing = true;
-        self->before_told = self->commanded_mm_s;
+        self->before_mm_s = self->commanded_mm_s;
         self->before = self->settled_mm / ((double)self->settled_us / 1e6);
-        self->way_told_mm = self->way_mm = 0;
+        self->way_commanded_mm = self->way_mm = 0;
     }
     self->settled_us = 0;
     self->settled_mm = 0;
@@ -137,8 +137,8 @@ void learn_lag_weigh(const learn_lag_t wheel[IW_SIDES], uint32_t lag_ms, learn_f
     }
     if (is_sure(&wheel[IW_LEFT]) && is_sure(&wheel[IW_RIGHT])) {
         const int32_t both_ms = (mean_ms(&wheel[IW_LEFT]) + mean_ms(&wheel[IW_RIGHT])) / 2;
-        learn_finding_t *told = learn_say(out_findings, '+', "wheel_lag_ms", LEARN_BOTH,
-                                          "both wheels are %" PRId32 " ms behind their setpoints", both_ms);
-        (void)snprintf(told->value, sizeof told->value, "%" PRId32, both_ms);
+        learn_finding_t *finding = learn_say(out_findings, '+', "wheel_lag_ms", LEARN_BOTH,
+                                             "both wheels are %" PRId32 " ms behind their setpoints", both_ms);
+        (void)snprintf(finding->value, sizeof finding->value, "%" PRId32, both_ms);
     }
 }

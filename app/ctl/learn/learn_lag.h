@@ -14,19 +14,19 @@
 /// State of one wheel.
 typedef struct {
     int32_t commanded_mm_s;
-    int64_t told_us;     ///< Time of the last setpoint; -1: none.
-    int64_t constant_us; ///< Time since which this is the setpoint.
+    int64_t commanded_us; ///< Time of the last setpoint; -1: none.
+    int64_t constant_us;  ///< Time since which this is the setpoint.
     double measured_mm_s;
     int64_t measured_us; ///< Time of the last speed frame; -1: none.
     double settled_mm;   ///< Distance and time at this setpoint, after the wheel has reached it.
     int64_t settled_us;
-    bool changing;      ///< The speed changes from a steady speed.
-    double before_told; ///< Steady speed before the change, commanded,
-    double before;      ///< and measured.
-    int64_t change_us;  ///< Duration of the change so far.
-    double way_told_mm; ///< Commanded distance beyond that of the steady speed.
-    double way_mm;      ///< Measured distance beyond that of the steady speed.
-    uint32_t count;     ///< Number of measured changes.
+    bool changing;           ///< The speed changes from a steady speed.
+    double before_mm_s;      ///< Steady speed before the change, commanded,
+    double before;           ///< and measured.
+    int64_t change_us;       ///< Duration of the change so far.
+    double way_commanded_mm; ///< Commanded distance beyond that of the steady speed.
+    double way_mm;           ///< Measured distance beyond that of the steady speed.
+    uint32_t count;          ///< Number of measured changes.
     double sum_ms;
     double least_ms;
     double most_ms;

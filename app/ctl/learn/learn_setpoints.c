@@ -52,11 +52,12 @@ static void weigh_common_type(const learn_t *self, int type, learn_findings_t *o
                         "more is commanded for seconds",
                         type, unseen);
     } else {
-        learn_finding_t *told = learn_say(out, '+', "setpoint_type", LEARN_BOTH,
-                                          "setpoint type %d moves the wheels: every setpoint with a speed has it, and "
-                                          "both wheels followed",
-                                          type);
-        (void)snprintf(told->value, sizeof told->value, "%d", type);
+        learn_finding_t *finding =
+            learn_say(out, '+', "setpoint_type", LEARN_BOTH,
+                      "setpoint type %d moves the wheels: every setpoint with a speed has it, and "
+                      "both wheels followed",
+                      type);
+        (void)snprintf(finding->value, sizeof finding->value, "%d", type);
         for (unsigned side = 0; side < IW_SIDES; side++) {
             const learn_setpoint_t *setpoint = &self->setpoint[side];
             if (setpoint->type[type] == setpoint->type_moving[type]) {
@@ -138,24 +139,24 @@ static bool both(const learn_t *self, bool (*judge)(const learn_setpoint_t *setp
 
 /// Lists the speeds that both wheels did not receive often enough for "every speed": "0", "forwards", "backwards". Empty
 /// if none is missing.
-static void list_untold(const learn_t *self, char *out_list, size_t size) {
+static void list_rare(const learn_t *self, char *out_list, size_t size) {
     static const char *const words[] = {"0", "forwards", "backwards"};
     iwn_text_t list = iwn_text_begin(out_list, size);
     for (unsigned kind = 0; kind < 3U; kind++) {
-        bool told = true;
+        bool seen_often = true;
         for (unsigned side = 0; side < IW_SIDES; side++) {
             const learn_setpoint_t *each = &self->setpoint[side];
             const uint64_t count[] = {each->at_rest, each->forward, each->backward};
-            told = told && count[kind] >= LEARN_FRAMES_MIN;
+            seen_often = seen_often && count[kind] >= LEARN_FRAMES_MIN;
         }
-        if (!told) {
+        if (!seen_often) {
             IWN_TEXT_JOIN(&list, (list.length > 0U) ? ", " : "", words[kind]);
         }
     }
 }
 
-static void doubt_role(learn_findings_t *out, const char *why, const char *cure) {
-    (void)learn_say(out, '?', "current_role", LEARN_BOTH, "current role: %s%s", why, cure);
+static void doubt_role(learn_findings_t *out, const char *why, const char *fix) {
+    (void)learn_say(out, '?', "current_role", LEARN_BOTH, "current role: %s%s", why, fix);
 }
 
 /// Judges the role limit: with it, both wheels are at standstill with speed 0 and a current.
@@ -178,26 +179,26 @@ static void weigh_limit(const learn_t *self, learn_findings_t *out) {
             "speed 0 and this current; ",
             "record their speed frames, and leave them at standstill for seconds");
     } else {
-        learn_finding_t *told =
+        learn_finding_t *finding =
             learn_say(out, '+', "current_role", LEARN_BOTH,
                       "current_role = limit: every speed has the same positive current, also 0 and backwards, and "
                       "with 0 the wheels are at standstill");
-        (void)snprintf(told->value, sizeof told->value, "limit");
+        (void)snprintf(finding->value, sizeof finding->value, "limit");
     }
 }
 
 static void weigh_role(const learn_t *self, bool own, learn_findings_t *out) {
-    char untold[32];
+    char rare[32];
     char text[120];
     const char *unseen = unseen_motion(self);
-    list_untold(self, untold, sizeof untold);
+    list_rare(self, rare, sizeof rare);
     if (!both(self, is_constant) && !both(self, is_signed)) {
         doubt_role(out,
                    "the currents fit neither limit (always one positive current) nor setpoint (sign of the speed, "
                    "0 at speed 0) on both wheels",
                    "");
-    } else if (untold[0] != '\0') {
-        (void)snprintf(text, sizeof text, "not commanded to both wheels often enough: speed %s; ", untold);
+    } else if (rare[0] != '\0') {
+        (void)snprintf(text, sizeof text, "not commanded to both wheels often enough: speed %s; ", rare);
         doubt_role(out, text, "record while the other controller holds, drives forwards and drives backwards");
     } else if (own) {
         doubt_role(
@@ -210,10 +211,10 @@ static void weigh_role(const learn_t *self, bool own, learn_findings_t *out) {
     } else if (both(self, is_constant)) {
         weigh_limit(self, out);
     } else {
-        learn_finding_t *told =
+        learn_finding_t *finding =
             learn_say(out, '+', "current_role", LEARN_BOTH,
                       "current_role = setpoint: the current has the sign of the speed, and is 0 with speed 0");
-        (void)snprintf(told->value, sizeof told->value, "setpoint");
+        (void)snprintf(finding->value, sizeof finding->value, "setpoint");
     }
 }
 
@@ -231,10 +232,10 @@ static void weigh_length(const learn_t *self, learn_findings_t *out) {
         (void)learn_say(out, '?', "setpoint_dlc", LEARN_BOTH,
                         "length of setpoints: they differ or are not valid, so the right length is not known");
     } else {
-        learn_finding_t *told =
+        learn_finding_t *finding =
             learn_say(out, (left->low == (int32_t)IW_DLC_SETPOINT) ? '+' : '-', "setpoint_dlc", LEARN_BOTH,
                       "every setpoint has %" PRId32 " bytes (document: %u)", left->low, (unsigned)IW_DLC_SETPOINT);
-        (void)snprintf(told->value, sizeof told->value, "%" PRId32, left->low);
+        (void)snprintf(finding->value, sizeof finding->value, "%" PRId32, left->low);
     }
 }
 

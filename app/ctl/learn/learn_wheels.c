@@ -85,11 +85,11 @@ static void weigh_sign(const learn_t *self, unsigned side, learn_findings_t *out
     }
     say_direction(forward, first, ahead, sizeof ahead);
     say_direction(false, first, back, sizeof back);
-    learn_finding_t *told = learn_say(out, (first > 0) ? '+' : '-', "feedback_sign", side, "%s: %s%s%s%s",
-                                      text_side(side), ahead, (forward && backward) ? ", " : "",
-                                      (forward && backward) ? back : " (the other direction: not recorded)",
-                                      (first > 0) ? "" : "; the gateway would latch feedback_sign");
-    (void)snprintf(told->value, sizeof told->value, "%s", (first > 0) ? "yes" : "no");
+    learn_finding_t *finding = learn_say(out, (first > 0) ? '+' : '-', "feedback_sign", side, "%s: %s%s%s%s",
+                                         text_side(side), ahead, (forward && backward) ? ", " : "",
+                                         (forward && backward) ? back : " (the other direction: not recorded)",
+                                         (first > 0) ? "" : "; the gateway would latch feedback_sign");
+    (void)snprintf(finding->value, sizeof finding->value, "%s", (first > 0) ? "yes" : "no");
 }
 
 /// Compares the commanded speed with the measured rpm.
@@ -184,7 +184,7 @@ static void weigh_force(const learn_wheel_t *wheel, unsigned side, learn_finding
     const char *unit = unit_of(permille);
     const bool is_unit = unit != NULL && unit[1] == 'N';
     const bool dead = wheel->force.low == wheel->force.high;
-    learn_finding_t *told =
+    learn_finding_t *finding =
         learn_say(out, (is_unit && unit[0] == documented[0]) ? '+' : '-', "force_unit", side,
                   "%s force at standstill / offset = %s%" PRId64 ".%02" PRId64 ": %s%s (document: %s)", text_side(side),
                   (permille < 0) ? "-" : "", size / 1000, size % 1000 / 10,
@@ -193,7 +193,7 @@ static void weigh_force(const learn_wheel_t *wheel, unsigned side, learn_finding
                   : dead         ? "the wheel subtracts the offset itself, or its force never changes"
                                  : "the wheel subtracts the offset itself",
                   is_unit ? " per count, if nothing pressed the handle" : "", documented);
-    (void)snprintf(told->value, sizeof told->value, "%s", is_unit ? unit : "");
+    (void)snprintf(finding->value, sizeof finding->value, "%s", is_unit ? unit : "");
 }
 
 static void weigh_pose(const learn_pose_t *pose, learn_findings_t *out) {
@@ -202,14 +202,14 @@ static void weigh_pose(const learn_pose_t *pose, learn_findings_t *out) {
         (void)learn_say(out, '?', "pose_byte_order", LEARN_BOTH, "byte order of the pose: %s",
                         (pose->count == 0U) ? "the recording has no pose frame (290 = 0x122)" : "it hardly changes");
     } else if (pose->way_big * 4U < pose->way_little) {
-        learn_finding_t *told = learn_say(out, '+', "pose_byte_order", LEARN_BOTH,
-                                          "the pose is smooth with the most significant byte first");
-        (void)snprintf(told->value, sizeof told->value, "yes");
+        learn_finding_t *finding = learn_say(out, '+', "pose_byte_order", LEARN_BOTH,
+                                             "the pose is smooth with the most significant byte first");
+        (void)snprintf(finding->value, sizeof finding->value, "yes");
     } else if (pose->way_little * 4U < pose->way_big) {
-        learn_finding_t *told = learn_say(
+        learn_finding_t *finding = learn_say(
             out, '-', "pose_byte_order", LEARN_BOTH,
             "the pose is smooth with the LEAST significant byte first: the gateway reads it in the other order");
-        (void)snprintf(told->value, sizeof told->value, "no");
+        (void)snprintf(finding->value, sizeof finding->value, "no");
     } else {
         (void)learn_say(out, '?', "pose_byte_order", LEARN_BOTH, "byte order of the pose: smooth in neither order");
     }

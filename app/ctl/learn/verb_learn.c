@@ -345,7 +345,7 @@ int verb_learn(ctl_t *self, int count, char **words) {
     if (code != CTL_OK || recording.refused) {
         return code;
     }
-    const bool told = learn->setpoint[IW_LEFT].count + learn->setpoint[IW_RIGHT].count > 0U;
+    const bool commanded = learn->setpoint[IW_LEFT].count + learn->setpoint[IW_RIGHT].count > 0U;
     if (self->json && !report_json(&study, recording.name)) {
         (void)recording_close(&recording);
         return ctl_fail(CTL_INTERNAL, "out of memory");
@@ -354,5 +354,5 @@ int verb_learn(ctl_t *self, int count, char **words) {
         report(&study, recording.name);
     }
     code = recording_close(&recording);
-    return (code != CTL_OK || told) ? code : CTL_NO;
+    return (code != CTL_OK || commanded) ? code : CTL_NO;
 }

@@ -166,7 +166,7 @@ void replay_step(replay_t *self, iw_time_us_t at_us) {
     if (self->echoes) {
         echo_what_was_sent(self);
     }
-    replay_tell_step(self);
+    replay_report_step(self);
 }
 
 static void count(replay_score_t *score, bool same) {
@@ -176,7 +176,7 @@ static void count(replay_score_t *score, bool same) {
 
 static void request(replay_t *self, const blackbox_entry_t *entry, iw_refusal_t refusal) {
     count(&self->requests, (uint8_t)refusal == entry->b);
-    replay_tell_request(self, entry, refusal);
+    replay_report_request(self, entry, refusal);
 }
 
 static iw_refusal_t drive(replay_t *self, const blackbox_entry_t *entry) {
@@ -209,7 +209,7 @@ static void compare(replay_t *self, const blackbox_entry_t *entry) {
     }
     count(is_state ? &self->states : &self->stops, same);
     if (!same) {
-        replay_tell_difference(self, entry);
+        replay_report_difference(self, entry);
     }
 }
 
@@ -217,11 +217,11 @@ static void answer(replay_t *self, const blackbox_entry_t *entry) {
     const iw_bus_facts_t facts = {.timing_contradicted = entry->a != 0U, .echo_proven = entry->b != 0U};
     switch (entry->kind) {
     case BLACKBOX_ESTOP:
-        replay_tell_answer(self, entry);
+        replay_report_answer(self, entry);
         self->estop = (int)entry->as.value;
         break;
     case BLACKBOX_BUS:
-        replay_tell_answer(self, entry);
+        replay_report_answer(self, entry);
         self->bus = (iw_bus_state_t)entry->a;
         break;
     case BLACKBOX_FACTS:
@@ -229,7 +229,7 @@ static void answer(replay_t *self, const blackbox_entry_t *entry) {
         break;
     case BLACKBOX_SUSPENDED:
         iw_gateway_suspended(&self->gateway, (entry->as.value > 0) ? (iw_time_us_t)entry->as.value : 0U);
-        replay_tell_answer(self, entry);
+        replay_report_answer(self, entry);
         break;
     default:
         if (self->answers < REPLAY_ANSWERS) {
@@ -262,11 +262,11 @@ void replay_event(replay_t *self, const blackbox_entry_t *entry) {
         request(self, entry, iw_gateway_release(gateway));
         break;
     case BLACKBOX_STOP:
-        replay_tell_request(self, entry, IW_REFUSE_NONE);
+        replay_report_request(self, entry, IW_REFUSE_NONE);
         iw_gateway_stop(gateway, entry->at_us, entry->number, (iw_cause_t)entry->a);
         break;
     case BLACKBOX_ESTOPPED:
-        replay_tell_request(self, entry, IW_REFUSE_NONE);
+        replay_report_request(self, entry, IW_REFUSE_NONE);
         iw_gateway_estop(gateway, entry->at_us, entry->number);
         break;
     case BLACKBOX_GONE:
@@ -274,7 +274,7 @@ void replay_event(replay_t *self, const blackbox_entry_t *entry) {
         break;
     case BLACKBOX_TARE:
         tare(self, entry);
-        replay_tell_request(self, entry, IW_REFUSE_NONE);
+        replay_report_request(self, entry, IW_REFUSE_NONE);
         break;
     case BLACKBOX_ASSUMPTION:
         know(self, entry);
@@ -291,11 +291,11 @@ void replay_event(replay_t *self, const blackbox_entry_t *entry) {
 
 /// Returns the rpm of a wheel that follows the setpoint.
 static int16_t obedient_rpm(const replay_t *self, size_t side, const iw_can_frame_t *setpoint) {
-    iw_codec_wheel_t told[IW_SIDES];
-    if (setpoint == NULL || iw_codec_decode(setpoint, told) != IW_CODEC_SETPOINT) {
+    iw_codec_wheel_t values[IW_SIDES];
+    if (setpoint == NULL || iw_codec_decode(setpoint, values) != IW_CODEC_SETPOINT) {
         return 0;
     }
-    return (int16_t)(told[side].setpoint.speed_mm_s * 1000 / (int32_t)replay_look(self).wheel[side].um_s_per_rpm);
+    return (int16_t)(values[side].setpoint.speed_mm_s * 1000 / (int32_t)replay_look(self).wheel[side].um_s_per_rpm);
 }
 
 /// Runs a cycle of the simulated bus: both wheels show the speed of their last setpoint.
@@ -305,9 +305,9 @@ static void turn_wheels(replay_t *self, iw_time_us_t at_us, iw_can_frame_t last[
     }
     for (size_t side = 0; side < IW_SIDES; side++) {
         iw_can_frame_t frame;
-        const iw_codec_wheel_t told = {
+        const iw_codec_wheel_t values = {
             .speed = {.speed_rpm = obedient_rpm(self, side, (last[side].id != 0U) ? &last[side] : NULL)}};
-        if (iw_codec_encode(IW_CODEC_SPEED, (iw_side_t)side, &told, &frame) == IW_OK) {
+        if (iw_codec_encode(IW_CODEC_SPEED, (iw_side_t)side, &values, &frame) == IW_OK) {
             (void)replay_frame(self, &frame);
         }
     }

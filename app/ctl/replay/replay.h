@@ -55,7 +55,7 @@ typedef struct {
     bool arming;
     uint32_t stop_number;
     uint32_t present;
-    bool heard[IW_SIDES];
+    bool online[IW_SIDES];
     iw_force_validity_t force[IW_SIDES];
     iw_assumption_entry_t assumptions[IW_ASSUMPTION_ITEMS];
     blackbox_drive_t drive;
@@ -100,19 +100,19 @@ void replay_finish(const replay_t *self);
 /// brought to this state.
 bool replay_warm(replay_t *self, const iw_config_t *config, const blackbox_entry_t *state);
 
-// --- decisions, as text or as JSON (replay_tell.c) -----------------------------------------------------------------
+// --- decisions, as text or as JSON (replay_report.c) -----------------------------------------------------------------
 
 /// Prints the changes of the last step.
-void replay_tell_step(replay_t *self);
+void replay_report_step(replay_t *self);
 
 /// Prints a request and its result. A drive command that is equal to the one before is not printed again.
-void replay_tell_request(replay_t *self, const blackbox_entry_t *entry, iw_refusal_t refusal);
+void replay_report_request(replay_t *self, const blackbox_entry_t *entry, iw_refusal_t refusal);
 
 /// Prints a changed answer of the port. Called before the answer is stored.
-void replay_tell_answer(const replay_t *self, const blackbox_entry_t *entry);
+void replay_report_answer(const replay_t *self, const blackbox_entry_t *entry);
 
 /// Prints a recorded decision that differs from the present one.
-void replay_tell_difference(const replay_t *self, const blackbox_entry_t *entry);
+void replay_report_difference(const replay_t *self, const blackbox_entry_t *entry);
 
 /// Prints a remark without a time.
 __attribute__((format(printf, 2, 3))) void replay_note(const replay_out_t *out, const char *format, ...);

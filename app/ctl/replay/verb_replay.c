@@ -38,7 +38,7 @@ typedef struct {
 } verb_replay_t;
 
 /// Replaces the ending of FILE.log. Returns false if the path has another ending or is too long.
-static bool beside(const char *path, const char *ending, char out[PATH_SIZE]) {
+static bool path_next_to(const char *path, const char *ending, char out[PATH_SIZE]) {
     const size_t length = strlen(path);
     const size_t cut = sizeof FRAMES_END - 1U;
     if (length <= cut || strcmp(path + length - cut, FRAMES_END) != 0) {
@@ -67,7 +67,7 @@ static int find_config(verb_replay_t *self) {
     if (self->config.radius_mm != 0U) {
         return CTL_OK;
     }
-    const int fd = beside(self->path, ".conf", path) ? source_open(self->ctl, path, SOURCE_WHOLE) : -1;
+    const int fd = path_next_to(self->path, ".conf", path) ? source_open(self->ctl, path, SOURCE_WHOLE) : -1;
     if (fd < 0) {
         return ctl_fail(CTL_USAGE, "%s: no configuration is next to it; name one: iwheelctl replay FILE --config FILE",
                         self->path);
@@ -79,7 +79,7 @@ static int find_config(verb_replay_t *self) {
 static int find_events(verb_replay_t *self) {
     static char path[PATH_SIZE];
     errno = ENOENT;
-    FILE *file = beside(self->path, ".jsonl", path) ? source_stream(self->ctl, path, SOURCE_WHOLE) : NULL;
+    FILE *file = path_next_to(self->path, ".jsonl", path) ? source_stream(self->ctl, path, SOURCE_WHOLE) : NULL;
     if (file == NULL && errno == ENOENT) {
         return CTL_OK;
     }

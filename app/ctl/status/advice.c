@@ -9,10 +9,10 @@
 
 typedef struct {
     const char *cause;
-    const char *cure;
-} cure_t;
+    const char *fix;
+} fix_t;
 
-static const cure_t cures[] = {
+static const fix_t fixes[] = {
     {"estop_line", "release the e-stop button (or fix its wire)"},
     {"estop_disagrees", "fix the e-stop's contact or wire, press and release its button"},
     {"estop_software", "check that no person is in the way"},
@@ -31,32 +31,32 @@ static const cure_t cures[] = {
     {"lease_lost", "the client must send drive commands more often, or raise lease_ms"},
 };
 
-static bool is_heard(const json_t *status, const char *side) {
+static bool is_online(const json_t *status, const char *side) {
     return json_is_true(json_object_get(json_object_get(status, side), "heard"));
 }
 
 /// Returns true if both wheels are online: wheels that send also acknowledge, so power and cable are not the cause. The
 /// fault lasts until the link is restarted.
 static bool has_lost_an_echo(const json_t *status, const char *bus) {
-    return strncmp(bus, "unix:", 5U) != 0 && is_heard(status, "left") && is_heard(status, "right");
+    return strncmp(bus, "unix:", 5U) != 0 && is_online(status, "left") && is_online(status, "right");
 }
 
-bool advice_cure(const json_t *status, const char *cause, char out_cure[ADVICE_SIZE]) {
+bool advice_fix(const json_t *status, const char *cause, char out_fix[ADVICE_SIZE]) {
     const char *bus = text_word(json_object_get(status, "bus"), "name");
-    out_cure[0] = '\0';
+    out_fix[0] = '\0';
     if (strcmp(cause, "send_stalled") == 0 && has_lost_an_echo(status, bus)) {
-        (void)snprintf(out_cure, ADVICE_SIZE,
+        (void)snprintf(out_fix, ADVICE_SIZE,
                        "the wheels are online, so an echo was lost (or the bus is full): ip link set %.32s down; ip "
                        "link set %.32s up (permanently: systemctl enable --now iwheel-can-restart@%.32s.path)",
                        bus, bus, bus);
         return true;
     }
-    for (size_t i = 0; i < sizeof cures / sizeof cures[0]; i++) {
-        if (strcmp(cures[i].cause, cause) == 0) {
-            (void)snprintf(out_cure, ADVICE_SIZE, "%s", cures[i].cure);
+    for (size_t i = 0; i < sizeof fixes / sizeof fixes[0]; i++) {
+        if (strcmp(fixes[i].cause, cause) == 0) {
+            (void)snprintf(out_fix, ADVICE_SIZE, "%s", fixes[i].fix);
         }
     }
-    return out_cure[0] != '\0';
+    return out_fix[0] != '\0';
 }
 
 bool advice_is_present(const json_t *status, const char *cause) {
@@ -104,9 +104,9 @@ static void add_present(const json_t *status, advice_t *self) {
     const json_t *present = NULL;
     json_array_foreach(json_object_get(status, "present"), index, present) {
         const char *cause = json_is_string(present) ? json_string_value(present) : "--";
-        char cure[ADVICE_SIZE];
+        char fix[ADVICE_SIZE];
         if (strcmp(cause, text_word(status, "cause")) != 0) {
-            add(self, "%.32s: %s", cause, advice_cure(status, cause, cure) ? cure : "see: iwheelctl why");
+            add(self, "%.32s: %s", cause, advice_fix(status, cause, fix) ? fix : "see: iwheelctl why");
         }
     }
 }
@@ -135,9 +135,9 @@ static void advise_listening(const json_t *status, advice_t *self) {
 void advice_collect(const json_t *status, advice_t *out_advice) {
     const char *state = text_word(status, "state");
     const char *cause = text_word(status, "cause");
-    char cure[ADVICE_SIZE];
+    char fix[ADVICE_SIZE];
     memset(out_advice, 0, sizeof(*out_advice));
-    const bool known = advice_cure(status, cause, cure);
+    const bool known = advice_fix(status, cause, fix);
     if (strcmp(state, "listening") == 0) {
         advise_listening(status, out_advice);
     } else if (strcmp(state, "armed") == 0) {
@@ -146,9 +146,9 @@ void advice_collect(const json_t *status, advice_t *out_advice) {
         add(out_advice,
             "zeros hold the wheels; to end that: iwheelctl release, and the machine may roll; or arm again");
     } else if (strcmp(state, "stopping") == 0) {
-        add(out_advice, "%s", known ? cure : "wait until both wheels are at standstill, then arm again");
+        add(out_advice, "%s", known ? fix : "wait until both wheels are at standstill, then arm again");
     } else if (strcmp(state, "latched") == 0) {
-        add(out_advice, "%.290s, then: iwheelctl reset", known ? cure : "remove the cause");
+        add(out_advice, "%.290s, then: iwheelctl reset", known ? fix : "remove the cause");
         add_present(status, out_advice);
     } else {
         add(out_advice, "this gateway reports an unknown state; use the iwheelctl of its version");

@@ -19,7 +19,7 @@ void advice_collect(const json_t *status, advice_t *out_advice);
 
 /// Writes the fix for a cause, depending on bus and wheels in the reply of status. Returns false and an empty text for
 /// an unknown cause.
-bool advice_cure(const json_t *status, const char *cause, char out_cure[ADVICE_SIZE]);
+bool advice_fix(const json_t *status, const char *cause, char out_fix[ADVICE_SIZE]);
 
 /// Returns true if the gateway has detected the cause within the last second or still detects it.
 bool advice_is_present(const json_t *status, const char *cause);

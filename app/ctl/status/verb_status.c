@@ -182,11 +182,11 @@ static void draw_cell(const paper_t *paper, const row_t *row, unsigned width, co
 }
 
 static void draw_head(const paper_t *paper, const char *name, unsigned width, const json_t *wheel) {
-    const json_t *heard = get(wheel, "heard");
+    const json_t *online = get(wheel, "heard");
     const char *rest = json_is_true(get(wheel, "at_rest")) ? "standstill" : "turning";
     char head[TEXT_CELL];
-    (void)snprintf(head, sizeof head, "%s %s", name, json_is_true(heard) ? rest : "OFFLINE");
-    paper_text(paper, json_is_true(heard) ? TONE_TITLE : TONE_BAD, width, head);
+    (void)snprintf(head, sizeof head, "%s %s", name, json_is_true(online) ? rest : "OFFLINE");
+    paper_text(paper, json_is_true(online) ? TONE_TITLE : TONE_BAD, width, head);
 }
 
 static void draw_wheels(const paper_t *paper, const json_t *left, const json_t *right) {

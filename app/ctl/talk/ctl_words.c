@@ -57,11 +57,11 @@ int words_read(const words_syntax_t *self, int count, char **words) {
         } else if (option == NULL) {
             *self->word = words[i];
             named = true;
-        } else if (option->take == NULL) {
+        } else if (option->read == NULL) {
             *(bool *)option->out = true;
         } else {
             i++;
-            code = option->take(option, self->verb, (i < count) ? words[i] : NULL);
+            code = option->read(option, self->verb, (i < count) ? words[i] : NULL);
         }
     }
     return code;

@@ -9,14 +9,14 @@ typedef struct option {
     const char *name; ///< Such as "--for"; NULL ends a list.
     /// Writes the value of the option, the next word, to `out`; `value` is NULL if there is no next word. Returns an
     /// exit code, after it has reported what is wrong. NULL: the option has no value and sets the bool `out`.
-    int (*take)(const struct option *option, const char *verb, const char *value);
+    int (*read)(const struct option *option, const char *verb, const char *value);
     void *out;
     const char *wants;      ///< For a text: description of the value; NULL: see the verb's page.
     duration_range_t range; ///< For a time.
 } option_t;
 
 /// A row of a list of options.
-#define OPTION(name_, take_, out_) .name = (name_), .take = (take_), .out = (out_)
+#define OPTION(name_, read_, out_) .name = (name_), .read = (read_), .out = (out_)
 
 /// Reads a text; `out` is a `const char *`.
 int option_text(const option_t *option, const char *verb, const char *value);

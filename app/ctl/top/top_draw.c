@@ -54,11 +54,11 @@ static void draw_head(const top_model_t *model) {
                    at_one ? " at " : "", at_one ? where : "",
                    json_is_true(get(estop, "simulated")) ? " (SIMULATED)" : "");
     const int column = COLS - (int)strlen(right);
-    const int room = column - 10;
+    const int columns = column - 10;
     top_put(model, 0, 0, TOP_TITLE, " iWheel  %.*s",
-            (room > 40)  ? 40
-            : (room > 5) ? room
-                         : 0,
+            (columns > 40)  ? 40
+            : (columns > 5) ? columns
+                            : 0,
             text_word(get(model->state, "bus"), "name"));
     top_put(model, 0, (column > 0) ? column : 0, released ? TOP_GOOD : TOP_BAD, "%s", right);
 }

@@ -109,13 +109,13 @@ static int draw_numbers(const top_model_t *model, int row, const json_t *wheel) 
 
 static int draw_wheel(const top_model_t *model, int row, const char *name, bool brief) {
     const json_t *wheel = get(model->state, (name[0] == 'L') ? "left" : "right");
-    const bool heard = json_is_true(get(wheel, "heard"));
-    char told[24];
+    const bool online = json_is_true(get(wheel, "heard"));
+    char label[24];
     char does[24];
-    (void)snprintf(told, sizeof told, "%-6s appl", name);
-    (void)snprintf(does, sizeof does, "%-6s %s", "", heard ? "meas" : "LOST");
-    draw_speed(model, row, told, TOP_CARE, get(wheel, "applied_mm_s"));
-    draw_speed(model, row + 1, does, heard ? TOP_GOOD : TOP_BAD, get(wheel, "speed_mm_s"));
+    (void)snprintf(label, sizeof label, "%-6s appl", name);
+    (void)snprintf(does, sizeof does, "%-6s %s", "", online ? "meas" : "LOST");
+    draw_speed(model, row, label, TOP_CARE, get(wheel, "applied_mm_s"));
+    draw_speed(model, row + 1, does, online ? TOP_GOOD : TOP_BAD, get(wheel, "speed_mm_s"));
     return brief ? 2 : 2 + draw_numbers(model, row + 2, wheel);
 }
 

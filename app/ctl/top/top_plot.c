@@ -159,9 +159,9 @@ static void draw_plot(const top_model_t *model, int number, const place_t *place
         limit_of(&model->history->value[force ? 2 : 0], force ? FORCE_MIN_mN : SPEED_MIN_mm_s, &negative);
     const int row = place->row;
     const int column = place->column;
-    const int room = place->columns - LABEL - 1;
+    const int space = place->columns - LABEL - 1;
     plot_t plot = {.values = model->history->value[number],
-                   .columns = (room > COLUMNS_MAX) ? COLUMNS_MAX : room,
+                   .columns = (space > COLUMNS_MAX) ? COLUMNS_MAX : space,
                    .rows = place->rows - 2,
                    .across = model->fine_blocks ? 2 : 1,
                    .down = model->fine_blocks ? BRAILLE_DOWN : 1,
@@ -182,19 +182,19 @@ static void draw_plot(const top_model_t *model, int number, const place_t *place
 }
 
 void top_draw_plots(const top_model_t *model, int row, int rows) {
-    const int beside = (COLS >= COLUMNS_TWO) ? 2 : 1;
+    const int per_row = (COLS >= COLUMNS_TWO) ? 2 : 1;
     int plots = TOP_PLOTS;
-    while (plots > 0 && rows / (plots / beside) < ROWS_MIN) {
+    while (plots > 0 && rows / (plots / per_row) < ROWS_MIN) {
         plots -= 2; // Speed is drawn before force.
     }
     if (plots == 0 || COLS < 40 || model->history == NULL) {
         return;
     }
-    const int each = rows / (plots / beside);
+    const int each = rows / (plots / per_row);
     const int height = (each > ROWS_MAX) ? ROWS_MAX : each;
-    const int width = COLS / beside;
+    const int width = COLS / per_row;
     for (int i = 0; i < plots; i++) {
-        const place_t place = {row + (i / beside) * height, (i % beside) * width, height, width};
+        const place_t place = {row + (i / per_row) * height, (i % per_row) * width, height, width};
         draw_plot(model, i, &place);
     }
 }

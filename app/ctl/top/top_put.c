@@ -41,8 +41,8 @@ void top_put(const top_model_t *model, int row, int column, top_tone_t tone, con
     char text[2U * TOP_TEXT_SIZE];
     char clean[2U * TOP_TEXT_SIZE];
     va_list arguments;
-    const int room = COLS - column;
-    if (row < 0 || row >= LINES || room <= 0) {
+    const int space = COLS - column;
+    if (row < 0 || row >= LINES || space <= 0) {
         return;
     }
     va_start(arguments, format);
@@ -54,7 +54,7 @@ void top_put(const top_model_t *model, int row, int column, top_tone_t tone, con
     int columns = 0;
     while (clean[length] != '\0') {
         columns += (((unsigned char)clean[length] & 0xC0U) != 0x80U) ? 1 : 0;
-        if (columns > room) {
+        if (columns > space) {
             break;
         }
         length++;
@@ -65,10 +65,10 @@ void top_put(const top_model_t *model, int row, int column, top_tone_t tone, con
 }
 
 int top_put_wrapped(const top_model_t *model, int row, int rows, top_tone_t tone, const char *text) {
-    const size_t room = (COLS > 3) ? (size_t)COLS - 2U : 1U;
+    const size_t space = (COLS > 3) ? (size_t)COLS - 2U : 1U;
     int used = 0;
     for (; used < rows && *text != '\0'; used++) {
-        const size_t cut = text_cut(text, (used < rows - 1) ? room : SIZE_MAX);
+        const size_t cut = text_cut(text, (used < rows - 1) ? space : SIZE_MAX);
         top_put(model, row + used, 1, tone, "%.*s", (int)cut, text);
         text += cut;
         text += strspn(text, " ");

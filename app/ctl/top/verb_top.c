@@ -59,15 +59,15 @@ static void disconnect(top_t *self, const char *why) {
     notice(self, "%s", why);
 }
 
-static void keep_sentence(top_t *self, const json_t *stop) {
+static void store_sentence(top_t *self, const json_t *stop) {
     const char *sentence = json_string_value(json_object_get(stop, "sentence"));
     (void)snprintf(self->model.last_stop, sizeof self->model.last_stop, "%s%s",
                    (json_integer_value(json_object_get(stop, "number")) > 0) ? "last stop: " : "",
                    (sentence != NULL) ? sentence : "");
     // The line above shows the fix for a latch, and only the rest fits into two lines.
-    char *const cure = strrchr(self->model.last_stop, ';');
-    if (cure != NULL && json_is_true(json_object_get(stop, "latched"))) {
-        *cure = '\0';
+    char *const fix = strrchr(self->model.last_stop, ';');
+    if (fix != NULL && json_is_true(json_object_get(stop, "latched"))) {
+        *fix = '\0';
     }
 }
 
@@ -94,7 +94,7 @@ static void try_connect(top_t *self) {
     }
     self->received_us = client_now_us();
     json_t *why = near_ask(self->ctl, json_pack("{s:s}", "cmd", "why"));
-    keep_sentence(self, why);
+    store_sentence(self, why);
     json_decref(why);
     send_request(self, json_pack("{s:s,s:[s,s],s:i}", "cmd", "watch", "topics", "state", "stop", "rate_hz", RATE_HZ),
                  NULL);
@@ -122,7 +122,7 @@ static void take_line(top_t *self, json_t *line) {
         self->model.state = json_incref(line);
         self->model.scale_mm_s = top_scale(self->model.scale_mm_s, line);
     } else if (strcmp(event, "stop") == 0) {
-        keep_sentence(self, line);
+        store_sentence(self, line);
     }
 }
 

@@ -98,15 +98,15 @@ void why_print_moment(void) {
     (void)puts("------ stop ---------------------------------------------------------------");
 }
 
-static void print_told(const json_t *told, int64_t stop_us) {
+static void print_frame(const json_t *json, int64_t stop_us) {
     int64_t at_us = 0;
-    const candump_t frame = frame_from_json(told, &at_us);
+    const candump_t frame = frame_from_json(json, &at_us);
     why_print_frame(&frame, at_us - stop_us);
 }
 
 /// Prints the last `most` of the frames before and the first `most` after the stop, as the gateway sent them; nothing
 /// if there are none.
-static void print_all_told(const json_t *why, size_t most) {
+static void print_frames(const json_t *why, size_t most) {
     const json_t *before = json_object_get(why, "frames_before");
     const json_t *after = json_object_get(why, "frames_after");
     const size_t count = json_array_size(before);
@@ -116,11 +116,11 @@ static void print_all_told(const json_t *why, size_t most) {
     }
     (void)putchar('\n');
     for (size_t i = (count > most) ? count - most : 0U; i < count; i++) {
-        print_told(json_array_get(before, i), stop_us);
+        print_frame(json_array_get(before, i), stop_us);
     }
     why_print_moment();
     for (size_t i = 0; i < json_array_size(after) && i < most; i++) {
-        print_told(json_array_get(after, i), stop_us);
+        print_frame(json_array_get(after, i), stop_us);
     }
 }
 
@@ -137,10 +137,10 @@ static void print_recording(const json_t *reply) {
 /// Prints the present fix for send_stalled. The sentence is as old as the stop, and only the present status shows
 /// whether power or a lost echo is the cause.
 static void print_stalled(ctl_t *self) {
-    char cure[ADVICE_SIZE];
+    char fix[ADVICE_SIZE];
     json_t *status = near_ask(self, json_pack("{s:s}", "cmd", "status"));
-    if (advice_is_present(status, "send_stalled") && advice_cure(status, "send_stalled", cure)) {
-        text_line(stdout, "send_stalled is still present: %s", cure);
+    if (advice_is_present(status, "send_stalled") && advice_fix(status, "send_stalled", fix)) {
+        text_line(stdout, "send_stalled is still present: %s", fix);
     }
     json_decref(status);
 }
@@ -153,7 +153,7 @@ static int ask(ctl_t *self, size_t frames) {
         print_stalled(self);
         if (stopped) {
             print_recording(reply);
-            print_all_told(reply, frames);
+            print_frames(reply, frames);
         }
     }
     json_decref(reply);
@@ -169,8 +169,8 @@ static const char *find_directory(ctl_t *self, const words_t *words, json_t **ou
     near_look(self, NULL, &gateway);
     json_decref(gateway.status);
     *out_owner = (gateway.result == NEAR_FOUND) ? near_ask(self, json_pack("{s:s}", "cmd", "why")) : NULL;
-    const char *told = json_string_value(json_object_get(*out_owner, "directory"));
-    return (told != NULL) ? told : WHY_DISK_DIRECTORY;
+    const char *directory = json_string_value(json_object_get(*out_owner, "directory"));
+    return (directory != NULL) ? directory : WHY_DISK_DIRECTORY;
 }
 
 int verb_why(ctl_t *self, int count, char **words) {

@@ -42,8 +42,8 @@ typedef struct {
     char stale_client[GW_CLIENT_TEXT_SIZE];
     char stopped_by[GW_STOPPER_SIZE];
     char estopped_by[GW_STOPPER_SIZE];
-    char bus_cure[256];
-    char stalled_cure[320];
+    char bus_fix[256];
+    char stalled_fix[320];
     char timing[320];
     char contradiction[IWN_SENTENCE_SIZE];
 } gw_refuse_texts_t;

@@ -31,7 +31,7 @@ static void log_estop(const gw_answers_t *self, const char *state) {
 }
 
 /// Logs it once when it begins, and requests a restart of the link if that is set up.
-static void tell_left_behind(const gw_answers_t *self) {
+static void report_left_behind(const gw_answers_t *self) {
     const iwl_bus_link_t *link = iwl_hal_link(&self->wheels->hal);
     char sentence[GW_WARNING_SIZE];
     gw_bus_left_sentence(link, self->server.bus, sentence, sizeof sentence);
@@ -51,7 +51,7 @@ static void log_stop(const gw_answers_t *self) {
 }
 
 static void log_lease(gw_answers_t *self, const char *change) {
-    const iw_client_t holder = self->server.told.holder;
+    const iw_client_t holder = self->server.reported.holder;
     sock_log(self->log, SOCK_LOG_INFO, "lease %s: %s", change,
              (holder == IW_CLIENT_NONE) ? "nobody" : iwn_target_name(&self->server, holder));
 }
@@ -80,7 +80,7 @@ void iwn_target_changed(iwn_server_t *server, const iw_snapshot_t *seen, iwn_cha
         break;
     case IWN_CHANGE_LEFT_BEHIND:
         if (present) {
-            tell_left_behind(self);
+            report_left_behind(self);
         }
         break;
     case IWN_CHANGE_ROLLING:
@@ -99,7 +99,7 @@ void iwn_target_changed(iwn_server_t *server, const iw_snapshot_t *seen, iwn_cha
         break;
     case IWN_CHANGE_STATE:
         sock_log(self->log, SOCK_LOG_INFO, "state: %s", word);
-        gw_wheels_note_state(self->wheels, seen, server->told.state);
+        gw_wheels_note_state(self->wheels, seen, server->reported.state);
         break;
     case IWN_CHANGE_HOLDING:
     default:
@@ -113,8 +113,8 @@ static bool is_any_unwell(const gw_health_t *health, gw_ailment_t ailment) {
 }
 
 /// A fault is active while a wheel has it. Log and warnings name the wheel.
-static void tell_ailment(gw_answers_t *self, const iw_snapshot_t *seen, const gw_health_t *before, gw_ailment_t ailment,
-                         const char *name) {
+static void report_ailment(gw_answers_t *self, const iw_snapshot_t *seen, const gw_health_t *before,
+                           gw_ailment_t ailment, const char *name) {
     const gw_health_t *health = &self->wheels->health;
     char sentence[GW_HEALTH_TEXT_SIZE];
     for (unsigned side = 0; side < IW_SIDES; side++) {
@@ -125,7 +125,7 @@ static void tell_ailment(gw_answers_t *self, const iw_snapshot_t *seen, const gw
     }
     if (is_any_unwell(health, ailment) != is_any_unwell(before, ailment)) {
         log_fault(self, name, is_any_unwell(health, ailment));
-        iwn_server_tell_fault(&self->server, name, is_any_unwell(health, ailment));
+        iwn_server_report_fault(&self->server, name, is_any_unwell(health, ailment));
     }
 }
 
@@ -137,8 +137,8 @@ static void observe_health(gw_answers_t *self, const iw_snapshot_t *seen) {
     }
     const gw_health_t before = *health;
     gw_health_look(health, seen);
-    tell_ailment(self, seen, &before, GW_BATTERY_LOW, "battery_low");
-    tell_ailment(self, seen, &before, GW_TEMPERATURE_HIGH, "temperature_high");
+    report_ailment(self, seen, &before, GW_BATTERY_LOW, "battery_low");
+    report_ailment(self, seen, &before, GW_TEMPERATURE_HIGH, "temperature_high");
 }
 
 static void observe_purge(gw_answers_t *self) {
@@ -177,7 +177,7 @@ void gw_answers_observe(gw_answers_t *self, const iw_snapshot_t *seen) {
     gw_answers_look_further(self, seen);
 }
 
-static void tell_frame(iwn_server_t *server, const gw_tapped_t *tapped) {
+static void report_frame(iwn_server_t *server, const gw_tapped_t *tapped) {
     iwn_out_t json = iwn_server_begin_event(server, "frame");
     iwn_out_frame(&tapped->frame, tapped->at_us, &json);
     iwn_server_send_event(server, IWN_TOPIC_FRAME, &json);
@@ -191,7 +191,7 @@ void gw_answers_frames(gw_answers_t *self) {
         return;
     }
     for (uint32_t i = 0; i < tape->tapped && watching > 0U; i++) {
-        tell_frame(&self->server, &tape->tap[i]);
+        report_frame(&self->server, &tape->tap[i]);
     }
     tape->tapped = 0;
     self->frames_us = now_us - now_us % GW_FRAMES_TOGETHER_US + GW_FRAMES_TOGETHER_US;

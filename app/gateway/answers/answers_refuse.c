@@ -38,15 +38,15 @@ static void describe_bus(const gw_wheels_t *wheels, const iw_snapshot_t *seen, g
     const char *bus = wheels->bus.name;
     const bool local = iwl_hal_link(&wheels->hal)->presence == IWL_LINK_LOCAL;
     const bool off = seen->bus == IW_BUS_OFF;
-    (void)snprintf(texts->bus_cure, sizeof texts->bus_cure, "%s%s",
+    (void)snprintf(texts->bus_fix, sizeof texts->bus_fix, "%s%s",
                    (local && off) ? "end it in the simulator: iwheel-sim busoff off"
                    : local        ? "start the simulator: iwheel-sim --can "
                    : off          ? "check cable, termination and bit rate; for more checks: iwheelctl doctor "
                                   : "bring it up; how: iwheelctl doctor ",
                    (local && off) ? "" : bus);
-    texts->stalled_cure[0] = '\0';
+    texts->stalled_fix[0] = '\0';
     if (!local) {
-        (void)snprintf(texts->stalled_cure, sizeof texts->stalled_cure,
+        (void)snprintf(texts->stalled_fix, sizeof texts->stalled_fix,
                        "; if so, it was lost: ip link set %s down; ip link set %s up", bus, bus);
     }
     (void)snprintf(texts->timing, sizeof texts->timing,
@@ -70,8 +70,8 @@ void iwn_target_describe(iwn_server_t *server, iw_refusal_t refusal, iwn_refuse_
     context->stopped_by = name_stopper(&self->stopped_by, server->stopped_us, texts->stopped_by);
     context->estopped_by = name_stopper(&self->estopped_by, server->estopped_us, texts->estopped_by);
     context->estop = gw_wheels_estop(wheels);
-    context->bus_cure = texts->bus_cure;
-    context->stalled_cure = texts->stalled_cure;
+    context->bus_fix = texts->bus_fix;
+    context->stalled_fix = texts->stalled_fix;
     context->timing = texts->timing;
     context->contradiction = texts->contradiction;
     context->configure = (refusal == IW_REFUSE_TRACK_NOT_SET)

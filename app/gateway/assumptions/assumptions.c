@@ -64,9 +64,9 @@ static void note_offset(gw_assumptions_t *self, iw_side_t side, const iw_force_t
 }
 
 static void observe_offset(gw_assumptions_t *self, iw_side_t side, const iw_force_t *force) {
-    gw_reported_offset_t *told = &self->told[side];
-    const bool tared = force->provenance == IW_OFFSET_OPERATOR && force->offset_us != told->offset_us;
-    if (force->provenance == told->provenance && force->offset_mN == told->offset_mN && !tared) {
+    gw_reported_offset_t *reported = &self->reported[side];
+    const bool tared = force->provenance == IW_OFFSET_OPERATOR && force->offset_us != reported->offset_us;
+    if (force->provenance == reported->provenance && force->offset_mN == reported->offset_mN && !tared) {
         return;
     }
     gw_reported_offset_t now = {
@@ -75,8 +75,8 @@ static void observe_offset(gw_assumptions_t *self, iw_side_t side, const iw_forc
         note_offset(self, side, force);
     }
     now.from = self->known.offset[side].from;
-    gw_assumptions_report_offset(self, side, &now, told);
-    *told = now;
+    gw_assumptions_report_offset(self, side, &now, reported);
+    *reported = now;
 }
 
 /// Logs each time that the button becomes untested, and at the start.
@@ -163,7 +163,7 @@ static void merge(gw_assumptions_t *self, const gw_stored_t *stored) {
     merge_offset(self, IW_RIGHT, &stored->offset[IW_RIGHT]);
     if (self->known.tried.wall_us == 0) { // A test since the start is newer.
         self->known.tried = stored->tried;
-        self->button.looked = false;
+        self->button.polled = false;
     }
 }
 
@@ -187,10 +187,10 @@ static void take_file(gw_assumptions_t *self, gw_file_store_news_t news, const c
     gw_assumptions_report_state(self);
 }
 
-static void take_result(gw_assumptions_t *self, gw_file_store_news_t news, int error) {
+static void receive_result(gw_assumptions_t *self, gw_file_store_news_t news, int error) {
     const bool failed = news != GW_FILE_STORE_WRITTEN;
-    const bool told = failed && self->state == GW_ASSUMPTIONS_FAILED && self->error == error;
-    const bool mended = !failed && self->state == GW_ASSUMPTIONS_FAILED;
+    const bool reported = failed && self->state == GW_ASSUMPTIONS_FAILED && self->error == error;
+    const bool recovered = !failed && self->state == GW_ASSUMPTIONS_FAILED;
     const bool set_aside = self->reason[0] != '\0'; // The first write must not clear this reason.
     self->state = failed ? GW_ASSUMPTIONS_FAILED : set_aside ? GW_ASSUMPTIONS_IGNORED : GW_ASSUMPTIONS_STORED;
     self->error = error;
@@ -199,7 +199,7 @@ static void take_result(gw_assumptions_t *self, gw_file_store_news_t news, int e
         self->stored_length = 0;
         self->write_us = self->wheels->now_us + GW_ASSUMPTIONS_RETRY_US;
     }
-    if ((failed && !told) || mended) {
+    if ((failed && !reported) || recovered) {
         gw_assumptions_report_state(self);
     }
 }
@@ -213,7 +213,7 @@ static void receive_store(gw_assumptions_t *self) {
         self->error = error;
         take_file(self, news, text, length);
     } else if (news != GW_FILE_STORE_NO_NEWS) {
-        take_result(self, news, (news == GW_FILE_STORE_GONE) ? ECHILD : error);
+        receive_result(self, news, (news == GW_FILE_STORE_GONE) ? ECHILD : error);
     }
     const bool waited = self->wheels->now_us - self->start_us > GW_ASSUMPTIONS_PATIENCE_US;
     if (!self->answered && (self->state != GW_ASSUMPTIONS_LOADING || waited)) {
@@ -259,8 +259,8 @@ bool gw_assumptions_confirm(gw_assumptions_t *self, iw_assumption_item_t item, c
                             iwn_refusal_t *out_refusal) {
     gw_stored_item_t *known = &self->known.item[item];
     const inspect_found_t verdict = inspect_assumption_compare(&self->configured, item, word->found);
-    const bool stands = verdict == INSPECT_FOUND_SAME && known->entry.state == IW_CONFIRMED &&
-                        known->entry.source == IW_SOURCE_OPERATOR && known->word.how[0] != '\0';
+    const bool is_repeated = verdict == INSPECT_FOUND_SAME && known->entry.state == IW_CONFIRMED &&
+                             known->entry.source == IW_SOURCE_OPERATOR && known->word.how[0] != '\0';
     if (verdict != INSPECT_FOUND_SAME && verdict != INSPECT_FOUND_DIFFERENT) {
         refuse(item, verdict, out_refusal);
         return false;
@@ -268,7 +268,7 @@ bool gw_assumptions_confirm(gw_assumptions_t *self, iw_assumption_item_t item, c
     const iw_assumption_entry_t entry = {(verdict == INSPECT_FOUND_SAME) ? IW_CONFIRMED : IW_CONTRADICTED,
                                          IW_SOURCE_OPERATOR, 0};
     gw_wheels_set_assumption(self->wheels, item, &entry);
-    if (!stands || word->how[0] != '\0') { // A repeated confirmation retains the description of the first one.
+    if (!is_repeated || word->how[0] != '\0') { // A repeated confirmation retains the description of the first one.
         known->word = *word;
         known->since_wall_us = iwl_clock_wall_us();
     }

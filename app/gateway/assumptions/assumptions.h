@@ -66,7 +66,7 @@ typedef struct gw_assumptions {
     gw_stored_t known;
     gw_assumptions_written_t written;
     gw_button_t button; ///< The owner sets its first two members.
-    gw_reported_offset_t told[IW_SIDES];
+    gw_reported_offset_t reported[IW_SIDES];
     iw_force_quality_t tare[IW_SIDES]; ///< Statistics of the window of the last tare.
     gw_file_store_t store;
     gw_assumptions_state_t state;

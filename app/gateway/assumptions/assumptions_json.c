@@ -52,7 +52,7 @@ static bool is_as_written(const gw_assumptions_written_t *written, const source_
 }
 
 /// Stores the bytes of the object at the end of the line, if they fit.
-static void keep(gw_assumptions_written_t *written, const source_t *source, const iwn_out_t *json, size_t begin) {
+static void store(gw_assumptions_written_t *written, const source_t *source, const iwn_out_t *json, size_t begin) {
     const size_t length = json->overflow ? 0U : json->length - begin;
     written->length = 0;
     if (length > 0U && length <= sizeof written->text) {
@@ -78,7 +78,7 @@ static void write_assumptions(gw_assumptions_written_t *written, const source_t 
         iwn_out_close(json, '}');
     }
     iwn_out_close(json, '}');
-    keep(written, source, json, begin);
+    store(written, source, json, begin);
 }
 
 static void write_store(const gw_assumptions_t *self, iwn_out_t *json) {

@@ -89,7 +89,7 @@ void gw_assumptions_report_state(gw_assumptions_t *self) {
     default:
         sock_log(log, SOCK_LOG_WARNING, "the assumptions about the wheels are not stored in %s: %s; %s%s", self->path,
                  sock_folder_fault(self->error),
-                 (self->store.child.fd < 0) ? "start the gateway again" : sock_folder_cure(self->error),
+                 (self->store.child.fd < 0) ? "start the gateway again" : sock_folder_fix(self->error),
                  (self->store.child.fd < 0) ? "" : ", or set [record] directory; the gateway tries again");
         break;
     }

@@ -77,9 +77,9 @@ static bool follow(gw_button_t *self, answer_t answer, iw_time_us_t now_us) {
 static bool is_news(gw_button_t *self, const iwl_hal_t *hal) {
     const bool disagrees = hal->estop_last == IW_ESTOP_DISAGREES;
     const bool news =
-        !self->looked || memcmp(self->last, hal->contact_last, sizeof self->last) != 0 || disagrees != self->disagreed;
+        !self->polled || memcmp(self->last, hal->contact_last, sizeof self->last) != 0 || disagrees != self->disagreed;
     self->disagreed = disagrees;
-    self->looked = true;
+    self->polled = true;
     memcpy(self->last, hal->contact_last, sizeof self->last);
     return news;
 }

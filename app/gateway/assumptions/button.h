@@ -39,7 +39,7 @@ typedef struct {
         bool active_high; ///< As configured.
     } contact[IWL_ESTOP_CONTACTS];
     uint32_t debounce_us; ///< Delay of a reported release. A press has no delay.
-    bool looked;          ///< State at the last reading:
+    bool polled;          ///< State at the last reading:
     int last[IWL_ESTOP_CONTACTS];
     bool disagreed; ///< The contacts had disagreed for too long.
     gw_button_state_t state;

@@ -151,11 +151,11 @@ static void tell_result(const gw_box_t *box, sock_log_t *log) {
         sock_log(log, SOCK_LOG_WARNING,
                  "no recording can be written to %s: %s; %s, or set [record] directory to another place. Until then a "
                  "stop is stored in memory only: iwheelctl why",
-                 directory, sock_folder_fault(result->error), sock_folder_cure(result->error));
+                 directory, sock_folder_fault(result->error), sock_folder_fix(result->error));
     } else if (result->error != 0) {
-        sock_log(
-            log, SOCK_LOG_WARNING, "stop %u is not recorded in %s: %s; %s, or set [record] directory to another place",
-            (unsigned)result->number, directory, sock_folder_fault(result->error), sock_folder_cure(result->error));
+        sock_log(log, SOCK_LOG_WARNING,
+                 "stop %u is not recorded in %s: %s; %s, or set [record] directory to another place",
+                 (unsigned)result->number, directory, sock_folder_fault(result->error), sock_folder_fix(result->error));
     } else {
         sock_log(log, SOCK_LOG_INFO, "stop %u is recorded in %s (%u frames, %u.%u s before it)",
                  (unsigned)result->number, result->path, (unsigned)result->frames, (unsigned)(result->ms / 1000U),

@@ -74,8 +74,8 @@ static uint32_t number_of(const char *name) {
     return (number < UINT32_MAX) ? (uint32_t)number : 0U;
 }
 
-/// Calls `take` for each file. A directory that cannot be read counts as empty.
-static void visit(int directory, void (*take)(int directory, const char *name, void *context), void *context) {
+/// Calls `visitor` for each file. A directory that cannot be read counts as empty.
+static void visit(int directory, void (*visitor)(int directory, const char *name, void *context), void *context) {
     const int fd = openat(directory, ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     DIR *list = (fd >= 0) ? fdopendir(fd) : NULL;
     if (list == NULL) {
@@ -86,7 +86,7 @@ static void visit(int directory, void (*take)(int directory, const char *name, v
     }
     const struct dirent *entry;
     while ((entry = readdir(list)) != NULL) {
-        take(directory, entry->d_name, context);
+        visitor(directory, entry->d_name, context);
     }
     (void)closedir(list);
 }
@@ -188,12 +188,12 @@ static bool was_in_motion(int directory, const found_t *recording) {
     return !gw_box_line_is_harmless(text);
 }
 
-/// Selects recordings for removal, the oldest first, until the rest fits `room`.
-static void choose(survey_t *survey, int directory, const gw_box_room_t *room, bool harmless_only) {
-    for (size_t i = 0; i < survey->recordings && (survey->left > room->recordings || survey->bytes > room->bytes);
+/// Selects recordings for removal, the oldest first, until the rest fits `limits`.
+static void choose(survey_t *survey, int directory, const gw_box_limits_t *limits, bool harmless_only) {
+    for (size_t i = 0; i < survey->recordings && (survey->left > limits->recordings || survey->bytes > limits->bytes);
          i++) {
         found_t *recording = &survey->file[i];
-        const bool stays = recording->removed || recording->number >= room->below;
+        const bool stays = recording->removed || recording->number >= limits->below;
         if (!stays && !(harmless_only && was_in_motion(directory, recording))) {
             recording->removed = true;
             survey->bytes -= recording->bytes;
@@ -213,10 +213,10 @@ static void take_chosen(int directory, const char *name, void *context) {
 }
 
 /// Makes one pass over the directory and returns the number of removed files.
-static size_t thin_out(survey_t *survey, int directory, const gw_box_room_t *room) {
-    choose(survey, directory, room, true);
-    if (room->in_motion) {
-        choose(survey, directory, room, false);
+static size_t thin_out(survey_t *survey, int directory, const gw_box_limits_t *limits) {
+    choose(survey, directory, limits, true);
+    if (limits->in_motion) {
+        choose(survey, directory, limits, false);
     }
     const size_t before = survey->files;
     if (survey->left < survey->recordings) {
@@ -225,11 +225,11 @@ static size_t thin_out(survey_t *survey, int directory, const gw_box_room_t *roo
     return before - survey->files;
 }
 
-void gw_box_files_rotate(int directory, const gw_box_room_t *room) {
+void gw_box_files_rotate(int directory, const gw_box_limits_t *limits) {
     survey_t *survey;
     do {
         survey = survey_directory(directory);
-    } while (thin_out(survey, directory, room) > 0U && survey->partial);
+    } while (thin_out(survey, directory, limits) > 0U && survey->partial);
 }
 
 bool gw_box_files_drop_oldest(int directory, uint32_t below, bool in_motion) {
@@ -237,8 +237,8 @@ bool gw_box_files_drop_oldest(int directory, uint32_t below, bool in_motion) {
     if (survey->recordings == 0U) {
         return false;
     }
-    const gw_box_room_t room = {survey->recordings - 1U, UINT64_MAX, below, in_motion};
-    return thin_out(survey, directory, &room) > 0U;
+    const gw_box_limits_t limits = {survey->recordings - 1U, UINT64_MAX, below, in_motion};
+    return thin_out(survey, directory, &limits) > 0U;
 }
 
 void gw_box_files_reserve(int directory, uint64_t bytes) {

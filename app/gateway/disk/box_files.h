@@ -43,11 +43,11 @@ typedef struct {
     uint64_t bytes;    ///< ... and of their total size.
     uint32_t below;    ///< Only recordings with lower numbers are removed.
     bool in_motion;    ///< Recordings of stops in motion may be removed too, when no other is left.
-} gw_box_room_t;
+} gw_box_limits_t;
 
-/// Removes recordings until the rest fits `room`: first those of stops at standstill, then the others, the oldest of
+/// Removes recordings until the rest fits `limits`: first those of stops at standstill, then the others, the oldest of
 /// each kind first. The time grows linearly with the number of files.
-void gw_box_files_rotate(int directory, const gw_box_room_t *room);
+void gw_box_files_rotate(int directory, const gw_box_limits_t *limits);
 
 /// Removes one recording with a number below `below`, in the order above. Returns false if there is none.
 bool gw_box_files_drop_oldest(int directory, uint32_t below, bool in_motion);

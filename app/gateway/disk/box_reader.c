@@ -263,7 +263,7 @@ void gw_box_reader_answer(const char *path, const gw_box_question_t *question, g
     out->client = question->client;
     if (directory < 0) {
         refuse(out, IWN_DENIED, "the directory of the recordings cannot be read: %s; %s", sock_folder_fault(errno),
-               sock_folder_cure(errno));
+               sock_folder_fix(errno));
         return;
     }
     if (question->list) {

@@ -206,7 +206,7 @@ static int write_recording(writer_t *self) {
         error = write_files(self, directory, number);
     }
     gw_box_files_rotate(directory,
-                        &(gw_box_room_t){self->config->keep_stops, GW_BOX_BYTES_MAX, number, self->in_motion});
+                        &(gw_box_limits_t){self->config->keep_stops, GW_BOX_BYTES_MAX, number, self->in_motion});
     reserve(self, directory);
     (void)fsync(directory);
     (void)close(directory);

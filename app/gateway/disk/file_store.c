@@ -120,7 +120,7 @@ static int in_directory(const work_t *work, size_t length) {
     return error;
 }
 
-static void keep(int fd, const void *context) {
+static void serve(int fd, const void *context) {
     const gw_file_store_t *self = (const gw_file_store_t *)context;
     static work_t work; // Too large for a stack.
     ssize_t length;
@@ -143,7 +143,7 @@ static void keep(int fd, const void *context) {
 int gw_file_store_open(gw_file_store_t *self, const char *directory, const char *name) {
     *self = (gw_file_store_t){.directory = directory};
     (void)snprintf(self->name, sizeof self->name, "%s", name);
-    const int error = gw_child_start(&self->child, &(gw_child_work_t){"iwheel-keeper", 0, keep, self});
+    const int error = gw_child_start(&self->child, &(gw_child_work_t){"iwheel-keeper", 0, serve, self});
     self->waits = error == 0;
     return error;
 }
@@ -162,9 +162,9 @@ bool gw_file_store_write(gw_file_store_t *self, const char *text, size_t length)
     if (self->waits || self->child.fd < 0) {
         return false;
     }
-    const bool taken = say(self, SAY_WRITE, text, length);
-    self->waits = taken || errno != EAGAIN; // If the process has ended, the next news report it.
-    return taken;
+    const bool accepted = say(self, SAY_WRITE, text, length);
+    self->waits = accepted || errno != EAGAIN; // If the process has ended, the next news report it.
+    return accepted;
 }
 
 void gw_file_store_set_aside(gw_file_store_t *self) {
@@ -174,13 +174,13 @@ void gw_file_store_set_aside(gw_file_store_t *self) {
 gw_file_store_news_t gw_file_store_receive(gw_file_store_t *self, const char **out_text, size_t *out_length,
                                            int *out_error) {
     size_t length;
-    const gw_child_news_t heard =
+    const gw_child_news_t child_news =
         self->waits ? gw_child_receive(&self->child, self->message, sizeof self->message, &length) : GW_CHILD_SILENT;
-    if (heard == GW_CHILD_SILENT) {
+    if (child_news == GW_CHILD_SILENT) {
         return GW_FILE_STORE_NO_NEWS;
     }
     self->waits = false;
-    if (heard == GW_CHILD_ENDED) {
+    if (child_news == GW_CHILD_ENDED) {
         return GW_FILE_STORE_GONE;
     }
     const gw_file_store_news_t news = (gw_file_store_news_t)self->message[0];

@@ -204,7 +204,7 @@ static seen_t look_at(const gw_bus_names_t *self, uid_t uid, unsigned place, gw_
 }
 
 /// Checks the places of all users who may run a gateway, and returns the most important result.
-static seen_t look(const gw_bus_names_t *self, gw_holder_t *out_holder) {
+static seen_t survey(const gw_bus_names_t *self, gw_holder_t *out_holder) {
     const uid_t users[] = {0, self->owners.service, self->owners.own};
     seen_t seen = look_at(self, self->owners.own, 0U, out_holder);
     for (size_t i = 0; i < sizeof users / sizeof users[0]; i++) {
@@ -225,10 +225,10 @@ int gw_bus_names_take(gw_bus_names_t *self, gw_holder_t *out_holder, gw_holder_t
         return error;
     }
     const iw_time_us_t until_us = iwl_clock_now_us() + GW_BUS_PATIENCE_US;
-    seen_t seen = look(self, out_holder);
+    seen_t seen = survey(self, out_holder);
     while (seen != SEEN_NOBODY && seen != SEEN_EARLIER && iwl_clock_now_us() < until_us) {
         (void)nanosleep(&again, NULL);
-        seen = look(self, out_holder);
+        seen = survey(self, out_holder);
     }
     if (seen == SEEN_EARLIER || seen == SEEN_LATER) {
         gw_bus_names_release(self);
@@ -246,7 +246,7 @@ bool gw_bus_names_poll(gw_bus_names_t *self, gw_holder_t *out_holder) {
         }
         (void)close(fd);
     }
-    const seen_t seen = first ? SEEN_NOBODY : look(self, out_holder);
+    const seen_t seen = first ? SEEN_NOBODY : survey(self, out_holder);
     return (seen == SEEN_EARLIER || seen == SEEN_LATER) && out_holder->uid != self->owners.own;
 }
 

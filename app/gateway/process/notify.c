@@ -41,7 +41,7 @@ void gw_notify_close(gw_notify_t *self) {
     }
 }
 
-static void tell(const gw_notify_t *self, const char *words) {
+static void notify(const gw_notify_t *self, const char *words) {
     if (self->fd >= 0) {
         (void)sendto(self->fd, words, strlen(words), MSG_DONTWAIT | MSG_NOSIGNAL,
                      (const struct sockaddr *)&self->address, self->address_length);
@@ -49,16 +49,16 @@ static void tell(const gw_notify_t *self, const char *words) {
 }
 
 void gw_notify_ready(const gw_notify_t *self) {
-    tell(self, "READY=1");
+    notify(self, "READY=1");
 }
 
 void gw_notify_stopping(const gw_notify_t *self) {
-    tell(self, "STOPPING=1");
+    notify(self, "STOPPING=1");
 }
 
 void gw_notify_cycle(gw_notify_t *self, iw_time_us_t now_us) {
     if (self->every_us != IW_NEVER && now_us - self->fed_us >= self->every_us) {
         self->fed_us = now_us;
-        tell(self, "WATCHDOG=1");
+        notify(self, "WATCHDOG=1");
     }
 }

@@ -47,8 +47,8 @@ static void judge_config(const gateway_config_t *config, inspect_findings_t *fin
     } else {
         inspect_say(findings, "config", INSPECT_WARN,
                     "%s not configured: the gateway starts and listens, arm will be refused", unset);
-        inspect_cure(findings,
-                     "set it under [wheels] in the configuration; if it is unknown: iwheelctl bringup finds it");
+        inspect_fix(findings,
+                    "set it under [wheels] in the configuration; if it is unknown: iwheelctl bringup finds it");
     }
     const iw_stop_budget_t budget = iw_config_stop_budget(&config->core);
     inspect_say(findings, "budget", INSPECT_OK,
@@ -84,21 +84,21 @@ static int write_error(int directory) {
 }
 
 /// `key`: configuration key of the directory.
-static void cure_directory(const char *path, const char *key, int error, inspect_findings_t *findings) {
+static void fix_directory(const char *path, const char *key, int error, inspect_findings_t *findings) {
     const unsigned uid = (unsigned)geteuid();
     switch (error) {
     case ENOENT:
-        inspect_cure(findings, "create it: sudo mkdir -p %s; sudo chown %u %s", path, uid, path);
+        inspect_fix(findings, "create it: sudo mkdir -p %s; sudo chown %u %s", path, uid, path);
         break;
     case EACCES:
     case EPERM:
-        inspect_cure(findings, "sudo chown %u %s (or run this check as the user of the service)", uid, path);
+        inspect_fix(findings, "sudo chown %u %s (or run this check as the user of the service)", uid, path);
         break;
     case ENOTDIR:
-        inspect_cure(findings, "correct %s in the configuration", key);
+        inspect_fix(findings, "correct %s in the configuration", key);
         break;
     default:
-        inspect_cure(findings, "%s, or set %s to another directory", sock_folder_cure(error), key);
+        inspect_fix(findings, "%s, or set %s to another directory", sock_folder_fix(error), key);
         break;
     }
 }
@@ -112,12 +112,12 @@ static void say_printed(char *text, inspect_verdict_t verdict, inspect_findings_
         what += (strncmp(what, prefixes[i], length) == 0) ? length : 0U;
     }
     what[strcspn(what, "\n")] = '\0';
-    char *const cure = strstr(what, "; ");
-    if (cure != NULL) {
-        *cure = '\0';
+    char *const fix = strstr(what, "; ");
+    if (fix != NULL) {
+        *fix = '\0';
     }
     inspect_say(findings, "socket", verdict, "%s", what);
-    inspect_cure(findings, "%s", (cure != NULL) ? cure + 2 : "choose another with --socket");
+    inspect_fix(findings, "%s", (fix != NULL) ? fix + 2 : "choose another with --socket");
 }
 
 /// `text`: message that the start would print.
@@ -151,8 +151,8 @@ static void judge_socket(const sock_listener_config_t *wanted, inspect_findings_
         say_printed(text, trouble, findings);
     } else if (error != 0) {
         inspect_say(findings, "socket", trouble, "socket %s: directory %s: %s", wanted->path, path, strerror(error));
-        cure_directory(path, (wanted->right == SOCK_DRIVE) ? "[northbound] socket" : "[northbound] watch_socket", error,
-                       findings);
+        fix_directory(path, (wanted->right == SOCK_DRIVE) ? "[northbound] socket" : "[northbound] watch_socket", error,
+                      findings);
     } else if (text[0] != '\0') {
         say_printed(text, INSPECT_WARN, findings);
     } else {
@@ -183,7 +183,7 @@ static void judge_record(const char *path, inspect_findings_t *findings) {
     inspect_say(findings, "record", INSPECT_WARN,
                 "record: directory %s: %s: the gateway starts, but records no stop and stores no assumption", path,
                 sock_folder_fault(error));
-    cure_directory(path, "[record] directory", error, findings);
+    fix_directory(path, "[record] directory", error, findings);
 }
 
 // Rights of groups ----------------------------------------------------------------------------------------------------
@@ -196,7 +196,7 @@ static void judge_group(const char *key, const char *group, const char *may, ins
     }
     inspect_say(findings, key, INSPECT_WARN, "group %s does not exist: the socket%s will have the gateway's own group",
                 group, (strcmp(key, "watch_group") == 0) ? " for watching" : "");
-    inspect_cure(findings, "sudo groupadd --system %s, or set [northbound] %s to another, or to none", group, key);
+    inspect_fix(findings, "sudo groupadd --system %s, or set [northbound] %s to another, or to none", group, key);
 }
 
 static void judge_rights(const gateway_config_t *config, inspect_findings_t *findings) {
@@ -211,7 +211,7 @@ static void judge_rights(const gateway_config_t *config, inspect_findings_t *fin
     if ((config->northbound.mode & S_IWOTH) != 0U) {
         inspect_say(findings, "mode", INSPECT_WARN, "socket mode %04o: every user of this machine may move the wheels",
                     (unsigned)config->northbound.mode);
-        inspect_cure(findings, "set [northbound] mode = 0660");
+        inspect_fix(findings, "set [northbound] mode = 0660");
     }
 }
 
@@ -229,18 +229,18 @@ static void judge_files(const gateway_config_t *config, inspect_findings_t *find
 /// Checks the bus and the e-stop, as far as they can be opened.
 static void judge_machine(const gateway_config_t *config, inspect_findings_t *findings) {
     static iwl_hal_t hal;
-    inspect_heard_t heard;
+    inspect_traffic_t traffic;
     const iwl_estop_config_t line = gw_report_estop(config);
     const inspect_config_t wanted = gw_report_config(config);
     const inspect_opened_t opened = inspect_open(&hal, config->bus.interface, &line, findings);
     if (!opened.hal) {
         return;
     }
-    inspect_listen(&hal, LISTEN_US, &heard);
+    inspect_listen(&hal, LISTEN_US, &traffic);
     if (opened.bus) {
         inspect_link(iwl_hal_link(&hal), &wanted, findings);
         inspect_room(iwl_hal_link(&hal), findings);
-        inspect_bus(iwl_hal_link(&hal), &heard, &wanted, findings);
+        inspect_bus(iwl_hal_link(&hal), &traffic, &wanted, findings);
     }
     if (opened.estop) {
         const inspect_estop_t estop = inspect_estop_of(&hal, config->estop.line);
@@ -251,7 +251,7 @@ static void judge_machine(const gateway_config_t *config, inspect_findings_t *fi
 
 int gw_report_check(const gateway_config_t *config, FILE *out) {
     static inspect_findings_t findings; // Too large for a stack.
-    char sentence[INSPECT_TEXT_SIZE + INSPECT_CURE_SIZE];
+    char sentence[INSPECT_TEXT_SIZE + INSPECT_FIX_SIZE];
     inspect_begin(&findings);
     findings.absent = INSPECT_SKIP;
     judge_config(config, &findings);

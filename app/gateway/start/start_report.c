@@ -56,7 +56,7 @@ void gw_report_start(const gateway_config_t *config, bool simulated, bool watche
 
 void gw_report_room(const iwl_bus_link_t *link, sock_log_t *log) {
     static inspect_findings_t findings; // Too large for a stack.
-    char sentence[INSPECT_TEXT_SIZE + INSPECT_CURE_SIZE];
+    char sentence[INSPECT_TEXT_SIZE + INSPECT_FIX_SIZE];
     inspect_begin(&findings);
     inspect_room(link, &findings);
     if (findings.count > 0U) {
@@ -67,7 +67,7 @@ void gw_report_room(const iwl_bus_link_t *link, sock_log_t *log) {
 
 void gw_report_unopened(const gateway_config_t *config, const char *cause, int error, FILE *err) {
     static inspect_findings_t findings; // Too large for a stack.
-    char sentence[INSPECT_TEXT_SIZE + INSPECT_CURE_SIZE];
+    char sentence[INSPECT_TEXT_SIZE + INSPECT_FIX_SIZE];
     inspect_begin(&findings);
     inspect_unopened(cause, cause == config->bus.interface, error, &findings);
     inspect_sentence(&findings.finding[0], sentence, sizeof sentence);

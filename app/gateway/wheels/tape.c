@@ -118,13 +118,13 @@ void gw_tape_step_end(gw_tape_t *self) {
 }
 
 void gw_tape_facts(gw_tape_t *self, iw_time_us_t now_us, const iw_bus_facts_t *facts) {
-    const uint8_t told = (uint8_t)((facts->timing_contradicted ? TIMING : 0U) | (facts->echo_proven ? ECHO : 0U));
-    if (told != self->facts) {
+    const uint8_t bits = (uint8_t)((facts->timing_contradicted ? TIMING : 0U) | (facts->echo_proven ? ECHO : 0U));
+    if (bits != self->facts) {
         const blackbox_entry_t entry = {
             .at_us = now_us, .kind = BLACKBOX_FACTS, .a = facts->timing_contradicted, .b = facts->echo_proven};
         gw_tape_put(self, &entry);
     }
-    self->facts = told;
+    self->facts = bits;
 }
 
 bool gw_tape_again(gw_tape_t *self, iw_time_us_t now_us) {

@@ -58,10 +58,11 @@ static bool is_trusted(iwc_span_t line) {
            memcmp(line.at, hello, sizeof hello - 1U) != 0;
 }
 
-/// Returns false if the line is not a message. Does not search for equal names in a trusted line.
+/// Returns false if the line is not a message.
 static bool admit_line(iwc_t *self, iwc_span_t line) {
     const bool trusted = is_trusted(line);
-    if (line.length > IWC_LINE_MAX || !iwc_json_is_object(line.at, line.length, trusted)) {
+    if (line.length > IWC_LINE_MAX || !(trusted ? iwc_json_is_trusted_object(line.at, line.length, &self->stored)
+                                                : iwc_json_is_object(line.at, line.length))) {
         return false;
     }
     const bool is_event = trusted || iwc_json_find(line, "event").at != NULL;
@@ -73,9 +74,9 @@ static bool admit_line(iwc_t *self, iwc_span_t line) {
 }
 
 bool iwc_queue_admit(iwc_t *self) {
-    size_t looked = self->whole;
+    size_t searched = self->whole;
     for (;;) {
-        const char *newline = memchr(self->in + looked, '\n', self->end - looked);
+        const char *newline = memchr(self->in + searched, '\n', self->end - searched);
         if (newline == NULL) {
             return self->end - self->whole <= IWC_LINE_MAX;
         }
@@ -83,8 +84,8 @@ bool iwc_queue_admit(iwc_t *self) {
         if (!admit_line(self, line)) {
             return false;
         }
-        looked = (size_t)(newline - self->in) + 1U;
-        self->whole = looked;
+        searched = (size_t)(newline - self->in) + 1U;
+        self->whole = searched;
     }
 }
 
@@ -148,7 +149,7 @@ typedef struct {
 } survivors_t;
 
 /// Returns true if a line stays. The caller calls it for each line, from the newest to the oldest.
-static bool keep(iwc_t *self, survivors_t *survivors, iwc_span_t line) {
+static bool retain(iwc_t *self, survivors_t *survivors, iwc_span_t line) {
     if (line.at[0] == STRUCK) {
         return false;
     }
@@ -177,7 +178,7 @@ void iwc_queue_thin(iwc_t *self) {
     for (size_t end = self->whole; end > self->begin;) {
         const char *before = memrchr(self->in + self->begin, '\n', end - 1U - self->begin);
         const size_t from = (before != NULL) ? (size_t)(before - self->in) + 1U : self->begin;
-        if (keep(self, &survivors, (iwc_span_t){self->in + from, end - 1U - from})) {
+        if (retain(self, &survivors, (iwc_span_t){self->in + from, end - 1U - from})) {
             to -= end - from;
             memmove(self->in + to, self->in + from, end - from);
         }

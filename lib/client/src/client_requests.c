@@ -32,7 +32,7 @@ static bool is_harmless(iwc_span_t cmd) {
 /// Returns a free entry for the id of one more drive command; NULL: none. The limit prevents a gateway that hung from
 /// receiving many old commands when it resumes.
 static int64_t *place_to_drive(iwc_t *self) {
-    for (int look = 0; look < 2; look++) {
+    for (int attempt = 0; attempt < 2; attempt++) {
         for (size_t i = 0; i < IWC_DRIVES_MAX; i++) {
             if (self->driven[i] == 0) {
                 return &self->driven[i];
@@ -47,7 +47,7 @@ static int64_t *place_to_drive(iwc_t *self) {
 /// request, or too long.
 static size_t number_it(char *line, const char *request, int64_t id) {
     const size_t length = strlen(request);
-    if (!iwc_json_is_object(request, length, false) || request[0] != '{' || memchr(request, '\n', length) != NULL) {
+    if (!iwc_json_is_object(request, length) || request[0] != '{' || memchr(request, '\n', length) != NULL) {
         return 0;
     }
     const int n = snprintf(line, IWC_REQUEST_MAX + 2U, "{\"id\":%lld,%s\n", (long long)id, request + 1);

@@ -52,7 +52,7 @@ typedef struct {
     char reason[sizeof(((iwc_t *)NULL)->reason)];
 } outcome_t;
 
-static void keep(outcome_t *outcome, const iwc_t *self, iwc_result_t result) {
+static void note_outcome(outcome_t *outcome, const iwc_t *self, iwc_result_t result) {
     outcome->result = result;
     outcome->error_number = self->error_number;
     memcpy(outcome->error, self->error, sizeof outcome->error);
@@ -79,7 +79,7 @@ static iwc_result_t stop_by_either(iwc_t *self, const char *const paths[2], cons
             }
             if (i == 0 &&
                 (first.result == IWC_CLOSED || result != IWC_TIMEOUT)) { // Not the timeout of the last attempt.
-                keep(&first, self, result);
+                note_outcome(&first, self, result);
             }
             again = again || !is_closed_to_us(result);
         }

@@ -39,6 +39,7 @@ struct iwc {
     char path[sizeof(((struct sockaddr_un *)NULL)->sun_path)];
     char error[64];
     char reason[1024];
+    iwc_stored_t stored;
     char line[IWC_LINE_MAX + 1U]; ///< The last message that the caller received, terminated.
     char in[IWC_IN_SIZE];
 };

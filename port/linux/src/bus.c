@@ -57,8 +57,8 @@ int iwl_bus_fd(const iwl_backend_store_t *store) {
     return seen(store)->watch_fd;
 }
 
-void iwl_bus_waited(iwl_backend_store_t *store, bool told) {
-    bus_of(store)->quiet = !told;
+void iwl_bus_waited(iwl_backend_store_t *store, bool woken) {
+    bus_of(store)->quiet = !woken;
 }
 
 iw_time_us_t iwl_bus_next_us(const iwl_backend_store_t *store) {
@@ -104,7 +104,7 @@ void iwl_bus_note(iwl_bus_t *bus, iw_bus_state_t state) {
 
 /// `forged`: a process of this machine sent it, which any user may do (fault 19). A forged bus-off still stops the
 /// wheels. A forged end of bus-off is ignored, and the carrier shows the end.
-static void hear_error(iwl_bus_t *bus, iwl_can_error_t error, bool forged) {
+static void handle_error(iwl_bus_t *bus, iwl_can_error_t error, bool forged) {
     if (error == IWL_CAN_ERROR_BUS_OFF) {
         bus->unhandled = IW_BUS_OFF;
         if (!forged) {
@@ -133,7 +133,7 @@ void iwl_bus_fill(iwl_bus_t *bus) {
     for (uint32_t i = 0; i < ours->count; i++) {
         const struct can_frame *raw = &ours->frame[i];
         if ((raw->can_id & CAN_ERR_FLAG) != 0U) {
-            hear_error(bus, iwl_can_error_of(raw), (ours->flags[i] & MSG_DONTROUTE) != 0);
+            handle_error(bus, iwl_can_error_of(raw), (ours->flags[i] & MSG_DONTROUTE) != 0);
             errors++;
         } else {
             bus->load.bits += iwl_socketcan_bits(raw);
@@ -166,7 +166,7 @@ int iwl_bus_send(iwl_backend_store_t *store, const iw_can_frame_t *frames, uint3
 }
 
 /// Removes the next frame that is not an error frame from the batch. Returns false if there is none.
-static bool take(iwl_socketcan_socket_t *from, iw_can_frame_t *out_frame) {
+static bool receive_own(iwl_socketcan_socket_t *from, iw_can_frame_t *out_frame) {
     while (!iwl_socketcan_socket_is_empty(from)) {
         const uint32_t i = from->next++;
         if ((from->frame[i].can_id & CAN_ERR_FLAG) == 0U) {
@@ -179,8 +179,8 @@ static bool take(iwl_socketcan_socket_t *from, iw_can_frame_t *out_frame) {
 
 /// `drained` ends the loop of the step without another system call. It counts once, so that the next step receives
 /// again.
-static bool take_ours(iwl_bus_t *bus, iw_can_frame_t *out_frame) {
-    while (!take(&bus->ours, out_frame)) {
+static bool receive_ours(iwl_bus_t *bus, iw_can_frame_t *out_frame) {
+    while (!receive_own(&bus->ours, out_frame)) {
         if (!bus->up || bus->ours.drained || bus->errors_left == 0U) {
             bus->ours.drained = false;
             return false;
@@ -190,7 +190,7 @@ static bool take_ours(iwl_bus_t *bus, iw_can_frame_t *out_frame) {
     return true;
 }
 
-static bool take_others(iwl_bus_t *bus, iw_can_frame_t *out_frame) {
+static bool receive_others(iwl_bus_t *bus, iw_can_frame_t *out_frame) {
     iwl_socketcan_socket_t *others = &bus->others;
     if (!bus->up || others->fd < 0 || bus->others_left == 0U) {
         return false;
@@ -198,7 +198,7 @@ static bool take_others(iwl_bus_t *bus, iw_can_frame_t *out_frame) {
     if (iwl_socketcan_socket_is_empty(others) && !others->drained) {
         (void)iwl_socketcan_socket_fill(others); // An error of the interface appears at the other socket too.
     }
-    if (!take(others, out_frame)) {
+    if (!receive_own(others, out_frame)) {
         others->drained = false;
         bus->others_left = 0;
         return false;
@@ -210,7 +210,7 @@ static bool take_others(iwl_bus_t *bus, iw_can_frame_t *out_frame) {
 
 int iwl_bus_receive(iwl_backend_store_t *store, iw_can_frame_t *out_frame) {
     iwl_bus_t *bus = bus_of(store);
-    if (take_ours(bus, out_frame) || take_others(bus, out_frame)) {
+    if (receive_ours(bus, out_frame) || receive_others(bus, out_frame)) {
         return 1;
     }
     return bus->up ? 0 : -1;

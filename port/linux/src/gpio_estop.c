@@ -109,7 +109,7 @@ static iw_time_us_t gpio_next_us(const void *self) {
 }
 
 /// Reads edges before the level. An edge between the two wakes the loop again; in the other order it would be lost.
-static void look(gpio_estop_t *estop, bool quiet) {
+static void poll_line(gpio_estop_t *estop, bool quiet) {
     if (!is_open(estop)) {
         return;
     }
@@ -126,7 +126,7 @@ static void look(gpio_estop_t *estop, bool quiet) {
 /// A line that was lost during the reading is reported, even if it returns immediately.
 static int gpio_pressed(void *self, bool quiet) {
     gpio_estop_t *estop = (gpio_estop_t *)self;
-    look(estop, quiet);
+    poll_line(estop, quiet);
     if (!is_open(estop)) {
         return -1;
     }

@@ -123,16 +123,16 @@ int iwl_gpio_line_level(const iwl_gpio_line_t *self) {
 
 int iwl_gpio_line_take_edges(iwl_gpio_line_t *self) {
     struct gpiod_line_event events[EVENTS];
-    int taken = 0;
-    while (taken < IWL_GPIO_EDGES_MAX) {
+    int count_read = 0;
+    while (count_read < IWL_GPIO_EDGES_MAX) {
         const int count = gpiod_line_event_read_fd_multiple(self->fd, events, EVENTS);
         if (count < 0) {
-            return (errno == EAGAIN || errno == EINTR) ? taken : -1;
+            return (errno == EAGAIN || errno == EINTR) ? count_read : -1;
         }
         if (count == 0) {
-            return taken;
+            return count_read;
         }
-        taken += count;
+        count_read += count;
     }
-    return taken;
+    return count_read;
 }

@@ -192,17 +192,17 @@ int iwl_gpio_line_level(const iwl_gpio_line_t *self) {
 }
 
 int iwl_gpio_line_take_edges(iwl_gpio_line_t *self) {
-    int taken = 0;
-    while (taken < IWL_GPIO_EDGES_MAX) {
+    int count_read = 0;
+    while (count_read < IWL_GPIO_EDGES_MAX) {
         const int count = gpiod_line_request_read_edge_events((struct gpiod_line_request *)self->line,
                                                               (struct gpiod_edge_event_buffer *)self->events, EVENTS);
         if (count < 0) {
-            return (errno == EAGAIN || errno == EINTR) ? taken : -1;
+            return (errno == EAGAIN || errno == EINTR) ? count_read : -1;
         }
         if (count == 0) {
-            return taken;
+            return count_read;
         }
-        taken += count;
+        count_read += count;
     }
-    return taken;
+    return count_read;
 }

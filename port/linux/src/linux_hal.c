@@ -149,9 +149,9 @@ int iwl_hal_estop2_fd(const iwl_hal_t *self) {
     return self->two_contacts ? self->estop_ops->watch_fd(&self->estop2) : -1;
 }
 
-void iwl_hal_waited(iwl_hal_t *self, iwl_reported_t told) {
-    self->estop_quiet = !told.estop;
-    iwl_bus_waited(&self->bus, told.bus);
+void iwl_hal_waited(iwl_hal_t *self, iwl_reported_t woken) {
+    self->estop_quiet = !woken.estop;
+    iwl_bus_waited(&self->bus, woken.bus);
 }
 
 void iwl_hal_poll(iwl_hal_t *self, iw_time_us_t now_us) {

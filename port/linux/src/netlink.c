@@ -77,7 +77,7 @@ static struct nlmsghdr *begin(iwl_netlink_t *self, void *buffer, uint16_t type, 
 }
 
 /// Classifies a reply to the request `sequence`: -1 it is not its reply, 0 it was read, otherwise an errno.
-static int take(const iwl_netlink_t *self, const struct nlmsghdr *reply, iwl_netlink_reading_t *out_reading) {
+static int parse(const iwl_netlink_t *self, const struct nlmsghdr *reply, iwl_netlink_reading_t *out_reading) {
     if (reply->nlmsg_seq != self->sequence) {
         return -1;
     }
@@ -100,7 +100,7 @@ static int ask(iwl_netlink_t *self, const struct nlmsghdr *request, iwl_netlink_
             return errno;
         }
         const struct nlmsghdr *reply = (const struct nlmsghdr *)buffer;
-        const int result = mnl_nlmsg_ok(reply, (int)size) ? take(self, reply, out_reading) : -1;
+        const int result = mnl_nlmsg_ok(reply, (int)size) ? parse(self, reply, out_reading) : -1;
         if (result >= 0) {
             return result;
         }

@@ -74,9 +74,9 @@ int iwl_socketcan_socket_open(iwl_socketcan_socket_t *self, int interface, iwl_s
 }
 
 uint32_t iwl_socketcan_socket_room(const iwl_socketcan_socket_t *self) {
-    int room = 0;
-    socklen_t length = sizeof room;
-    return (getsockopt(self->fd, SOL_SOCKET, SO_RCVBUF, &room, &length) == 0) ? (uint32_t)room : 0U;
+    int size = 0;
+    socklen_t length = sizeof size;
+    return (getsockopt(self->fd, SOL_SOCKET, SO_RCVBUF, &size, &length) == 0) ? (uint32_t)size : 0U;
 }
 
 void iwl_socketcan_socket_close(iwl_socketcan_socket_t *self) {

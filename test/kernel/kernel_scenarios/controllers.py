@@ -29,6 +29,7 @@ def set_up(name, **timing):
 class ControllerRig(Rig):
     """Gateway on one controller; wheels and recorder on the other: what is recorded was on the bus."""
 
+    exit_clears = False
     interface, wheels = CONTROLLERS
     presses = ()  # of a GPIO line
 

@@ -97,7 +97,7 @@ static int request_line(struct gpiod_line *line, int flags, bool both) {
     fake_gpio.offset = (unsigned)((char *)(void *)line - &lines[1][0]);
     fake_gpio.is_input = true;
     fake_gpio.both_edges = both;
-    fake_gpio.room = 16U; // libgpiod 1 always uses this size.
+    fake_gpio.buffer_size = 16U; // libgpiod 1 always uses this size.
     fake_gpio.pulled_up = (flags & GPIOD_LINE_REQUEST_FLAG_BIAS_PULL_UP) != 0;
     errno = fake_gpio.busy_error;
     if (fake_gpio.busy_error != 0 || pipe(fake_gpio.ends) != 0) {

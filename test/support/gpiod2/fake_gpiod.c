@@ -12,7 +12,7 @@ static char one;
 static struct dirent entry;
 static unsigned listed;
 static unsigned allocated;
-static unsigned wished_room;
+static unsigned wanted_size;
 static bool shown_own;
 static unsigned shown_offset;
 
@@ -112,7 +112,7 @@ struct gpiod_line_request *gpiod_chip_request_lines(struct gpiod_chip *chip, str
         return NULL;
     }
     fake_gpio.requested++;
-    fake_gpio.room = wished_room;
+    fake_gpio.buffer_size = wanted_size;
     return (struct gpiod_line_request *)(void *)&one;
 }
 
@@ -163,7 +163,7 @@ int gpiod_line_config_add_line_settings(struct gpiod_line_config *lines, const u
 
 struct gpiod_request_config *gpiod_request_config_new(void) {
     allocated++;
-    wished_room = 0;
+    wanted_size = 0;
     return (struct gpiod_request_config *)(void *)&one;
 }
 
@@ -178,7 +178,7 @@ void gpiod_request_config_set_consumer(struct gpiod_request_config *config, cons
 
 void gpiod_request_config_set_event_buffer_size(struct gpiod_request_config *config, size_t size) {
     (void)config;
-    wished_room = (unsigned)size;
+    wanted_size = (unsigned)size;
 }
 
 void gpiod_line_request_release(struct gpiod_line_request *line) {

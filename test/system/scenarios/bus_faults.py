@@ -185,9 +185,9 @@ def row20_odd_frames(t):
     ms = t.first_after(rig, muted_us, lambda value: value < 300, "a ramp although odd frames came", 80)
     t.figure(f"ramp after {ms or 0:.0f} ms")
     t.stopped_by(client, "wheel_lost")
-    after = client.request("status")["counters"]
     for name, sent in (("bad_format", odd), ("bad_length", short)):
-        t.check(after[name] - before[name] >= sent, f"each is counted as {name}: {after[name] - before[name]} of {sent}")
+        counted = rig.wait_status(client, lambda s, name=name, sent=sent: s["counters"][name] - before[name] >= sent, 1)
+        t.check(counted, f"each is counted as {name}: {client.request('status')['counters'][name] - before[name]} of {sent}")
     feed(rig, 0.3, 256, bytes(8))
     t.check(client.request("status")["left"]["heard"], "a longer frame is accepted")
     rig.sim.ask("unmute left")

@@ -226,7 +226,7 @@ def forget(rig, can_id):
     rig.bus.frames[:] = [frame for frame in rig.bus.frames if frame.id != can_id]
 
 
-@scenario("a babbling node with an id above 545 on a full bus: invariant 4 holds", 7)
+@scenario("a babbling node with an id above 545 on a full bus: invariant 4 holds", 7, native="a flood")
 def row21_babble_high(t):
     rig, client = t.running()
     driver = driving_process(t, rig)  # A process of its own: this one has 9000 frames a second to write down.
@@ -244,7 +244,7 @@ def row21_babble_high(t):
     t.judge(rig)
 
 
-@scenario("a babbling node with the lowest id on a full bus: send_stalled, latched; from zero afterwards", 7)
+@scenario("a babbling node with the lowest id on a full bus: send_stalled, latched; from zero afterwards", 7, native="a flood")
 def row21_babble_low(t):
     rig, client, stream = driving(t)
     rig.note("dead")

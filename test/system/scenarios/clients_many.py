@@ -21,6 +21,7 @@ from scenario import scenario
 from .arguments import call
 from .bus_faults import wait_reset
 
+FLOOD = "a flood"  # It never waits, so virtual time would stop.
 ROOM = 6  # Descriptors that are left when clients come in a crowd.
 
 
@@ -40,7 +41,7 @@ def read_some(sock, seconds=0.5):
         return b""
 
 
-@scenario("observers die, flood, connect 1000 times: the owner is undisturbed", 10)
+@scenario("observers die, flood, connect 1000 times: the owner is undisturbed", 10, native=FLOOD)
 def row05_many_observers(t):
     rig, owner = t.running()
     path = rig.path("gateway.sock")
@@ -87,7 +88,7 @@ def row05_many_observers(t):
     t.judge(rig)
 
 
-@scenario("no descriptor left: no busy loop, the owner is undisturbed", 8)
+@scenario("no descriptor left: no busy loop, the owner is undisturbed", 8, native="processor time")
 def row05_out_of_descriptors(t):
     rig = t.rig({"northbound": {"max_clients": 64}})
     rig.start_gateway()
@@ -123,7 +124,7 @@ def row05_out_of_descriptors(t):
     t.judge(rig)
 
 
-@scenario("sixty observers that ask and watch without end: the e-stop does not wait for them", 14)
+@scenario("sixty observers that ask and watch without end: the e-stop does not wait for them", 14, native=FLOOD)
 def row05_sixty_observers(t):
     rig = t.rig({"northbound": {"max_clients": 64}})
     rig.start_gateway()
@@ -179,7 +180,7 @@ def read_recording(path, name, pieces, over):
         offset = (offset + len(data)) % piece["size"]
 
 
-@scenario("a crowd of watchers reads a large recording, asks and stops without end: no gap, and the stop counts", 12)
+@scenario("a crowd of watchers reads a large recording, asks and stops without end: no gap, and the stop counts", 12, native=FLOOD)
 def row05_watchers_and_recordings(t):
     rig = t.rig()
     rig.settings["northbound"].update(watch_socket=rig.path("watch.sock"), watch_group="none")

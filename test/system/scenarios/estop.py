@@ -61,7 +61,7 @@ for part in range(4):
         presses(t, 100 + part)
 
     run.__name__ = f"row11_presses_{part + 1}"
-    scenario(f"{PRESSES} presses in motion at random phase", 42)(run)
+    scenario(f"{PRESSES} presses in motion at random phase", 42, native="" if part else "processor time")(run)
 
 
 @scenario("pulses of 1 to 20 ms latch", 8)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-/// Takes the place of the port's file of the same name: every access to a register of the bus controller goes to a model. The
-/// addresses are those of an `brd_bxcan_registers_t` that was told by `register_access_connect`; its memory is never touched.
+/// Replaces the port's file of the same name: every access to a register of the bus controller goes to a model. The addresses
+/// are those of the `brd_bxcan_registers_t` passed to `register_access_connect`; its memory is never accessed.
 #ifndef BRD_REGISTER_ACCESS_H
 #define BRD_REGISTER_ACCESS_H
 

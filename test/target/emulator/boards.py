@@ -73,7 +73,7 @@ class Board:
             getattr(self.machine, port).drive(pin, level)
 
     def estop_level(self):
-        """Of the pin that EXTI line 0 looks at."""
+        """Level of the pin that EXTI line 0 watches."""
         port = self.ports[self.machine.exti.selection & 0xF]
         return getattr(self.machine, port).level(0)
 
@@ -185,7 +185,7 @@ class Stm32f103(Board):
     }
 
     def is_mapped(self, transceiver):
-        """RM0008 9.4.2: CAN_REMAP. SWJ_CFG other than 0 would take the debugger's pins."""
+        """RM0008 9.4.2: CAN_REMAP. SWJ_CFG other than 0 would disable the debugger's pins."""
         self.machine.expect(not self.remap >> 24 & 7, "SWJ_CFG was changed")
         return self.remap >> 13 & 3 == {"port_a": 0, "port_b": 2}[transceiver[0]]
 

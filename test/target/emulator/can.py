@@ -35,8 +35,8 @@ def load_model(path):
         ("begin", None, [pointer, ctypes.c_int]),
         ("slow_aborts", None, [pointer, number]),
         ("end", None, [pointer, ctypes.c_int, ctypes.c_int]),
-        ("hear", ctypes.c_bool, [pointer, frame]),
-        ("hear_error", None, [pointer]),
+        ("receive", ctypes.c_bool, [pointer, frame]),
+        ("receive_error", None, [pointer]),
         ("lines", number, [pointer]),
         ("violation", ctypes.c_char_p, [pointer]),
         ("overruns", number, [pointer]),
@@ -102,8 +102,8 @@ class Controller:
             "offer",
             "begin",
             "end",
-            "hear",
-            "hear_error",
+            "receive",
+            "receive_error",
             "lines",
             "violation",
             "overruns",
@@ -144,7 +144,7 @@ class Controller:
         raw = RawFrame(id=frame.id, remote=remote, dlc=frame.remote_dlc if remote else len(frame.data))
         for at, byte in enumerate(frame.data):
             raw.data[at] = byte
-        return self.hear(ctypes.byref(raw))
+        return self.receive(ctypes.byref(raw))
 
 
 class FdController(Controller):
@@ -174,7 +174,7 @@ class Wheel:
     powered: bool = True
     speed_mm_s: float = 0.0
     target_mm_s: int = 0
-    heard_ns: int = -(10**12)
+    received_ns: int = -(10**12)
     ticks: float = 0.0
     queue: list = field(default_factory=list)
     due: dict = field(default_factory=dict)
@@ -185,9 +185,9 @@ class Wheel:
         self.due = dict.fromkeys(("speed", "status", "force"), now_ns + self.phase_ns) if on else {}
         self.next_ns = now_ns + self.phase_ns if on else None
 
-    def hear(self, frame):
+    def receive(self, frame):
         if self.powered and frame.id == (LEFT, RIGHT)[self.side]:
-            self.target_mm_s, self.heard_ns = frame.setpoint()[0], frame.time_ns
+            self.target_mm_s, self.received_ns = frame.setpoint()[0], frame.time_ns
 
     def produce(self, now_ns):
         if self.next_ns is None or now_ns < self.next_ns:
@@ -199,7 +199,7 @@ class Wheel:
         self.next_ns = min(self.due.values())
 
     def speed(self, now_ns):
-        target = self.target_mm_s if now_ns - self.heard_ns < 1000 * MS else 0
+        target = self.target_mm_s if now_ns - self.received_ns < 1000 * MS else 0
         step = 8.0  # 2000 mm/s2 in 4 ms
         self.speed_mm_s += max(-step, min(step, target - self.speed_mm_s))
         self.ticks += self.speed_mm_s * 0.004 / (2 * math.pi * 0.192 * 1000 / 60)
@@ -226,12 +226,12 @@ class Bus:
         self.flooded = 0
         self.stuck = False  # Held dominant.
         self.stuck_in_ours = False  # ... since the middle of a frame of the chip.
-        self.cut = None  # Where the chip is cut off: "cable" (it still hears itself) or "receiver" (always recessive).
-        self.corrupt_chip = False  # What the chip sends is destroyed.
+        self.cut = None  # Point at which the chip is cut off: "cable" (it still receives its own frames) or "receiver" (always recessive).
+        self.corrupt_chip = False  # Frames of the chip are destroyed.
         self.acknowledge_chip = True
         self.current = None  # (frame, mailbox or None, end)
         self.idle_ns = 0
-        self.calm = False  # Nothing happens before what next_event_ns told last.
+        self.calm = False  # Nothing happens before the time that next_event_ns returned last.
         self.suspended_ns = 0  # Until then the chip may not begin: an error-passive node waits 8 bits after each of its frames.
 
     def next_event_ns(self, now_ns):
@@ -273,7 +273,7 @@ class Bus:
         if self.current and self.current[1] is not None:
             self.machine.can.end(self.current[1], end)
         elif self.current and self.machine.can_listens:
-            self.machine.can.hear_error()
+            self.machine.can.receive_error()
         self.current = None
 
     def advance(self, now_ns):
@@ -332,23 +332,23 @@ class Bus:
             frame.time_ns = end_ns - 10 * BIT_NS  # Valid at the end of the frame's last-but-one bit, before the space.
             self.log.append(Frame(frame.id, frame.data, frame.time_ns, frame.sender))
             for wheel in self.wheels:
-                wheel.hear(frame)
+                wheel.receive(frame)
         if self.machine.can_listens and not self.machine.can.is_on():
             self.machine.can.dominant()
             self.machine.can.recessive(11)
 
     def finish_ours(self, frame, mailbox):
         understood = self.machine.can.understands() and not self.corrupt_chip and self.cut != "receiver"
-        heard = any(wheel.powered for wheel in self.wheels) and self.acknowledge_chip and not self.cut
-        self.machine.can.end(mailbox, BIT_ERROR if not understood else SENT if heard else NO_ACKNOWLEDGEMENT)
+        received = any(wheel.powered for wheel in self.wheels) and self.acknowledge_chip and not self.cut
+        self.machine.can.end(mailbox, BIT_ERROR if not understood else SENT if received else NO_ACKNOWLEDGEMENT)
         if self.machine.can.is_passive():
             self.suspended_ns = self.idle_ns + 8 * BIT_NS
-        return understood and heard
+        return understood and received
 
     def finish_theirs(self, frame):
         listens = self.machine.can_listens
         if listens and not self.machine.can.understands():
-            self.machine.can.hear_error()
+            self.machine.can.receive_error()
             listens = False
         acknowledged = self.machine.can.deliver(frame) if listens else False
         others = sum(1 for wheel in self.wheels if wheel.powered and frame.sender != f"wheel{wheel.side}")

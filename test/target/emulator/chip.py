@@ -136,7 +136,7 @@ class ClocksF4(Clocks):
     apb1_reset_offset = 0x20
     pll_bits = 0
     core_max_hz, apb1_max_hz, apb2_max_hz = 168_000_000, 42_000_000, 84_000_000
-    reserved, reserved_value = 0xF << 28, 2 << 28  # Of PLLCFGR, kept as after reset.
+    reserved, reserved_value = 0xF << 28, 2 << 28  # Reserved bits of PLLCFGR, unchanged since reset.
 
     def pll_from_hse(self):
         return bool(self.pllcfgr >> 22 & 1)
@@ -186,7 +186,7 @@ class Port:
         self.changed, self.levels = True, None
 
     def input(self):
-        """The levels of all pins; kept until something about them changes."""
+        """The levels of all pins; cached until one changes."""
         if self.levels is None:
             self.levels = sum(self.level(pin) << pin for pin in range(16))
         return self.levels
@@ -282,7 +282,7 @@ class Exti:
         self.registers = dict.fromkeys((0, 4, 8, 0xC, 0x10, 0x14), 0)
         self.selection, self.last = 0, None
 
-    def look(self, level):
+    def poll(self, level):
         if self.last is not None and level != self.last and self.registers[0x8 if level else 0xC] & 1:
             self.registers[0x14] |= 1
         self.last = level
@@ -302,7 +302,7 @@ class Exti:
 
 class Uart:
     """USART2 with somebody at its other end. `sent`: what the chip said; `send`: what is said to it. Bytes pass one by one through DR, or
-    through the DMA; what the DMA carries is brought up to date whenever somebody looks."""
+    through the DMA; the emulator updates the DMA at each access."""
 
     baud = 115200
 
@@ -534,7 +534,7 @@ class DmaF4(Dma):
 
 
 class Flash:
-    """Pages that the image may erase and program, by the registers of the flash interface. What takes time stops the CPU.
+    """Pages that the image may erase and program, by the registers of the flash interface. The CPU stops during an operation.
 
     `cut_after`: power fails during the operation of that number from now on, which gets half of its bits through; `next_cut` is the
     same for the time after the next power-on."""
@@ -579,7 +579,7 @@ class Flash:
         if self.chip.power_lost:
             return
         at = address - self.base
-        self.chip.expect(0 <= at < self.size, f"0x{address:08X} of the flash was erased, which is not for what is kept")
+        self.chip.expect(0 <= at < self.size, f"0x{address:08X} of the flash was erased, which is outside the stored records")
         self.operations, self.erasures = self.operations + 1, self.erasures + 1
         cut = self.is_cut()
         self.memory[at : at + size] = bytes(old | 0xA5 for old in self.memory[at : at + size]) if cut else b"\xff" * size
@@ -599,7 +599,7 @@ class Flash:
         elif offset == 0x10 and not self.cr & self.lock:
             self.cr = value
             self.keys = []
-            self.look()
+            self.poll()
         elif offset == 0x14:
             self.ar = value
 
@@ -609,7 +609,7 @@ class FlashF1(Flash):
 
     base, size, lock, unit, program_ns, erase_ns = 0x0800F800, 0x800, 1 << 7, 2, 70 * US, 40 * MS
 
-    def look(self):
+    def poll(self):
         if self.cr & 0x42 == 0x42:
             self.erase(self.ar & ~0x3FF, 0x400)
 
@@ -619,15 +619,15 @@ class FlashF4(Flash):
 
     base, size, lock, unit, program_ns, erase_ns = 0x08010000, 0x30000, 1 << 31, 4, 100 * US, 2000 * MS
 
-    def look(self):
+    def poll(self):
         sector = self.cr >> 3 & 0xF
         if self.cr & 0x10002 == 0x10002:
-            self.chip.expect(self.cr >> 8 & 3 == 2, "the flash is not told to work with 32 bits")
+            self.chip.expect(self.cr >> 8 & 3 == 2, "the flash is not set to work with 32 bits")
             self.erase({4: 0x08010000, 5: 0x08020000}.get(sector, 0), 0x10000 * (sector - 3))
 
 
 class Watchdog:
-    """IWDG. Prescaler and reload take 5 cycles of its oscillator; SR tells."""
+    """IWDG. Prescaler and reload need 5 cycles of its oscillator; SR shows it."""
 
     def __init__(self, lsi_hz):
         self.lsi_hz = lsi_hz

@@ -169,7 +169,7 @@ class FlashG4(chip.Flash):
         else:
             self.chip.expect(False, f"0x{offset:X} of the flash was written, which is not modelled")
 
-    def look(self):
+    def poll(self):
         """3.3.6: PER, STRT, and the number of the page in its bank."""
         if self.cr & 0x10002 != 0x10002:
             return

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Somebody who looks at the lamp and reads its pattern."""
+"""Watches the lamp and reads its pattern."""
 
 from .chip import MS
 
@@ -8,7 +8,7 @@ class Lamp:
     def __init__(self, port, pin, lit):
         self.port, self.pin, self.lit, self.changes = port, pin, lit, [(0, False)]
 
-    def look(self, machine):
+    def watch(self, machine):
         port = getattr(machine, self.port)
         state = port.is_output(self.pin) and port.level(self.pin) == self.lit
         if state != self.changes[-1][1]:
@@ -18,7 +18,7 @@ class Lamp:
         return next(state for since_ns, state in reversed(self.changes) if since_ns <= time_ns)
 
     def pattern(self, now_ns):
-        """What the last second looked like: "steady", "dark", or how often it was lit, as "3 flashes"; half-second blinks by their
+        """Pattern of the last second: "steady", "dark", or how often it was lit, as "3 flashes"; half-second blinks by their
         number too, with the share of light: "2 flashes, 50 % lit"."""
         samples = [self.was_lit(time_ns) for time_ns in range(max(now_ns - 1000 * MS, 0), now_ns, MS)]
         if all(samples) or not any(samples):

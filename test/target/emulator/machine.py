@@ -58,7 +58,7 @@ class BlockClock(ctypes.Structure):
 class Machine:
     library = None  # Holds block_hook; set by the runner.
     SP = SP
-    POISON = 0xA5  # What RAM is full of after power-on: anything but zero.
+    POISON = 0xA5  # Contents of RAM after power-on: anything but zero.
 
     def __init__(self, board, image, seed=1):
         self.board, self.image, self.now_ns = board, image, 0
@@ -73,15 +73,15 @@ class Machine:
     def build_cpu(self):
         cpu = self.cpu = Uc(UC_ARCH_ARM, UC_MODE_THUMB | UC_MODE_MCLASS)
         cpu.ctl_set_cpu_model(self.board.cpu_model)
-        kept = range(self.board.flash.base & ~0xFFF, self.board.flash.base + self.board.flash.size)  # map_flash has these.
-        assert 0x08000000 + len(self.image) <= self.board.flash.base, "the image reaches into what is kept"
-        cpu.mem_map(0x08000000, kept.start - 0x08000000)
-        cpu.mem_map(kept.stop, 0x08100000 - kept.stop)
+        records = range(self.board.flash.base & ~0xFFF, self.board.flash.base + self.board.flash.size)  # map_flash has these.
+        assert 0x08000000 + len(self.image) <= self.board.flash.base, "the image reaches into the stored records"
+        cpu.mem_map(0x08000000, records.start - 0x08000000)
+        cpu.mem_map(records.stop, 0x08100000 - records.stop)
         cpu.mem_map(0x20000000, self.board.ram_size)
-        cpu.mem_write(0x08000000, self.image[: kept.start - 0x08000000])  # Its end, texts and no code, may share a page with what is kept: map_flash.
+        cpu.mem_write(0x08000000, self.image[: records.start - 0x08000000])  # Its end, texts and no code, may share a page with the records: map_flash.
         cpu.mem_write(ENDLESS, bytes((0xFE, 0xE7)))
         cpu.mem_write(0x20000000, bytes([self.POISON]) * self.board.ram_size)
-        cpu.mem_map(0x1FFF0000, 0x10000)  # What the maker wrote: the chip's own number.
+        cpu.mem_map(0x1FFF0000, 0x10000)  # Written by the manufacturer: the chip's own number.
         cpu.mem_write(self.board.unique_id_address, bytes(range(0x41, 0x4D)))
         self.frame, self.after_entry = Registers(cpu, *FRAME, SP, PRIMASK), Registers(cpu, SP, XPSR, LR, PC)
         self.after_exit, self.pc = Registers(cpu, SP, *FRAME), Registers(cpu, PC)
@@ -143,7 +143,7 @@ class Machine:
             self.sleeping = True
 
     def hard_fault(self):
-        """An access where no memory is, which nobody but HardFault's handler takes. Without a stack the registers cannot be saved, and the
+        """An access where no memory is. Only the HardFault handler handles it. Without a stack the registers cannot be saved, and the
         handler begins nevertheless."""
         self.faults += 1
         (vector,) = struct.unpack_from("<I", self.image, 4 * HARD_FAULT)
@@ -251,8 +251,8 @@ class Machine:
     def look_at_pins(self):
         for name in self.board.ports:
             getattr(self, name).changed = False
-        self.exti.look(self.board.estop_level())
-        self.lamp.look(self)
+        self.exti.poll(self.board.estop_level())
+        self.lamp.watch(self)
 
     # ---- exceptions and reset -------------------------------------------------------------------------------------
 
@@ -300,7 +300,7 @@ class Machine:
         self.tick_ns, self.syst = None, {0x10: 0, 0x14: 0, 0x18: 0}
 
     def reset(self, cause, flag):
-        """RAM keeps its contents; everything else begins anew."""
+        """RAM retains its contents; everything else restarts."""
         self.resets.append((self.now_ns, cause))
         self.clocks.flags |= flag
         self.frozen = False
@@ -379,7 +379,7 @@ class Machine:
         return (self.syst[0x14] + 1) * 10**9 // self.clocks.core_hz
 
     def count_tick(self):
-        """The tick that is due; code has not been told yet."""
+        """The tick that is due, before its interrupt."""
         if self.tick_ns is not None and self.now_ns >= self.tick_ns:
             self.clock.is_asked_to_stop = 1
             self.pending.add(SYSTICK)

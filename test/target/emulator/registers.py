@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Several registers of the CPU at once, without the cost of one wrapped call for each: that is a third of the emulation's time."""
+"""Reads several registers of the CPU in one call; one wrapped call for each costs a third of the emulation's time."""
 
 import ctypes
 

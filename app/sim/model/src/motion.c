@@ -65,21 +65,21 @@ static int64_t approaching(const sim_motion_t *self, int64_t target_um_s, int64_
 
 static int64_t driving(const sim_motion_t *self, int64_t dt_us) {
     int64_t const torque = torque_mm_s2(self);
-    int64_t const told = (int64_t)self->setpoint.speed_mm_s * (1000 - self->droop_permille);
+    int64_t const values = (int64_t)self->setpoint.speed_mm_s * (1000 - self->droop_permille);
     if (self->freewheels) {
         return coasting(self, self->speed_um_s, dt_us);
     }
     if (self->runaway_mm_s != 0) {
         int64_t const more = (int64_t)self->runaway_mm_s * 1000;
-        return approaching(self, told + ((told < 0) ? -more : more), self->config.accel_mm_s2, dt_us);
+        return approaching(self, values + ((values < 0) ? -more : more), self->config.accel_mm_s2, dt_us);
     }
     if (torque == 0) {
         return coasting(self, self->speed_um_s, dt_us);
     }
-    if (self->config.current_is_setpoint && told == 0) {
+    if (self->config.current_is_setpoint && values == 0) {
         return clamp(self->speed_um_s + torque * dt_us / 1000, TOP_SPEED_um_s);
     }
-    return approaching(self, clamp(told, TOP_SPEED_um_s), (torque < 0) ? -torque : torque, dt_us);
+    return approaching(self, clamp(values, TOP_SPEED_um_s), (torque < 0) ? -torque : torque, dt_us);
 }
 
 static void count_ticks(sim_motion_t *self, int64_t way_nm) {

@@ -49,7 +49,7 @@ static void swap_pairs_of_bytes(iw_can_frame_t *frame) {
 }
 
 static void encode(const sim_pair_t *self, iw_side_t side, const sim_message_t *message, iw_can_frame_t *out_frame) {
-    (void)iw_codec_encode(message->kind, side, &message->told, out_frame);
+    (void)iw_codec_encode(message->kind, side, &message->values, out_frame);
     if (self->pose_reversed && message->kind == IW_CODEC_POSE) {
         swap_pairs_of_bytes(out_frame);
     }
@@ -84,7 +84,7 @@ bool sim_pair_step(sim_pair_t *self, iw_time_us_t now_us, sim_sent_t *out_sent) 
     }
 }
 
-static void hear_left_speed(sim_pair_t *self, iw_time_us_t now_us, const iw_codec_speed_t *speed) {
+static void receive_left_speed(sim_pair_t *self, iw_time_us_t now_us, const iw_codec_speed_t *speed) {
     if (self->wheel[IW_RIGHT].state == SIM_WHEEL_RUNNING) {
         int64_t const milli_rpm = (int64_t)speed->speed_rpm * 1000;
         sim_motion_config_t const *const config = &self->wheel[IW_RIGHT].motion.config;
@@ -93,13 +93,13 @@ static void hear_left_speed(sim_pair_t *self, iw_time_us_t now_us, const iw_code
 }
 
 void sim_pair_receive(sim_pair_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame) {
-    iw_codec_wheel_t told[IW_SIDES];
-    iw_codec_kind_t const kind = iw_codec_decode(frame, told);
+    iw_codec_wheel_t values[IW_SIDES];
+    iw_codec_kind_t const kind = iw_codec_decode(frame, values);
     iw_side_t const side = iw_codec_side(frame->id);
     if (kind == IW_CODEC_SETPOINT) {
-        sim_wheel_receive(&self->wheel[side], now_us, &told[side].setpoint);
+        sim_wheel_receive(&self->wheel[side], now_us, &values[side].setpoint);
     } else if (kind == IW_CODEC_SPEED && side == IW_LEFT) {
-        hear_left_speed(self, now_us, &told[IW_LEFT].speed);
+        receive_left_speed(self, now_us, &values[IW_LEFT].speed);
     }
 }
 

@@ -148,14 +148,14 @@ bool sim_bus_step(sim_bus_t *self, iw_time_us_t now_us, sim_delivery_t *out_deli
         if (self->done_us > now_us) {
             return false;
         }
-        bool const taken = head(self, self->sending) != NULL;
-        if (taken) {
+        bool const arbitrated = head(self, self->sending) != NULL;
+        if (arbitrated) {
             end(self, out_delivery);
         }
         self->free_us = self->done_us;
         self->done_us = IW_NEVER;
         self->sending = SIM_BUS_NONE;
-        if (taken) {
+        if (arbitrated) {
             return true;
         }
     }

@@ -24,7 +24,7 @@ static void find_next(sim_wheel_t *self) {
     }
 }
 
-static void silence(sim_wheel_t *self) {
+static void stop_sending(sim_wheel_t *self) {
     for (unsigned kind = 0U; kind < SIM_TELEMETRY_KINDS; kind++) {
         self->due_us[kind] = IW_NEVER;
     }
@@ -39,11 +39,11 @@ void sim_wheel_init(sim_wheel_t *self, const sim_wheel_config_t *config, iw_side
     sim_random_init(&self->random, seed * 2U + (uint64_t)side);
     sim_motion_init(&self->motion, &config->motion, 0U);
     sim_force_init(&self->force, config->sensor_zero_mN, config->unit);
-    silence(self);
+    stop_sending(self);
 }
 
 static void boot(sim_wheel_t *self, iw_time_us_t now_us) {
-    silence(self);
+    stop_sending(self);
     self->late_count = 0U;
     sim_motion_release(&self->motion, now_us);
     self->state = SIM_WHEEL_BOOTING;
@@ -194,13 +194,13 @@ static void fill(sim_wheel_t *self, iw_time_us_t now_us, sim_telemetry_t kind, s
                                                                     IW_CODEC_FORCE, IW_CODEC_OFFSET};
     out->kind = proto_kind[kind];
     if (kind == SIM_TELEMETRY_SPEED) {
-        fill_speed(self, &out->told.speed);
+        fill_speed(self, &out->values.speed);
     } else if (kind == SIM_TELEMETRY_FORCE) {
         bool const learning = now_us < self->learn_until_us;
-        out->told.force.force_raw = sim_force_sample(&self->force, now_us, learning, &self->random);
-        out->told.force.debug_raw = (int16_t)(self->sent[kind] & 0x7FFFU);
+        out->values.force.force_raw = sim_force_sample(&self->force, now_us, learning, &self->random);
+        out->values.force.debug_raw = (int16_t)(self->sent[kind] & 0x7FFFU);
     } else if (kind == SIM_TELEMETRY_OFFSET) {
-        out->told.offset.offset_dN = self->force.learned_dN;
+        out->values.offset.offset_dN = self->force.learned_dN;
     }
 }
 
@@ -218,9 +218,9 @@ bool sim_wheel_step(sim_wheel_t *self, uint8_t battery_dV, sim_pose_t *pose, sim
     sim_telemetry_t const kind = take_due(self);
     fill(self, now_us, kind, out_message);
     if (kind == SIM_TELEMETRY_STATUS) {
-        fill_status(self, battery_dV, &out_message->told.status);
+        fill_status(self, battery_dV, &out_message->values.status);
     } else if (kind == SIM_TELEMETRY_POSE) {
-        out_message->told.pose = sim_pose_step(pose, now_us, self->motion.position_nm);
+        out_message->values.pose = sim_pose_step(pose, now_us, self->motion.position_nm);
     }
     if (self->muted || lose(self)) {
         return false;

@@ -68,7 +68,7 @@ typedef enum {
 
 /// Facts that the owner has found in this step.
 typedef struct {
-    bool heard;        ///< Both wheels are online.
+    bool online;       ///< Both wheels are online.
     bool at_rest;      ///< Both wheels were at standstill for rest_ms.
     bool settled;      ///< Both wheels were at standstill for IW_PERMIT_SETTLED_US.
     bool output_zero;  ///< The last pair was zero, or none was sent since the last pause.
@@ -131,7 +131,7 @@ void iw_permit_init(iw_permit_t *self, const iw_config_t *config, iw_time_us_t n
 void iw_permit_raise(iw_permit_t *self, const iw_event_t *event, iw_time_us_t now_us);
 
 /// Reports that this step cannot judge ages: SEND_STALLED and WHEEL_LOST remain present if they were present.
-void iw_permit_keep_present(iw_permit_t *self);
+void iw_permit_retain_present(iw_permit_t *self);
 
 /// Applies the effects of time and of `view`: end of the lease, of arming and of the hold. The owner writes `view`
 /// before the call.
@@ -164,7 +164,7 @@ iw_refusal_t iw_permit_drive(iw_permit_t *self, iw_time_us_t sent_us, iw_client_
 
 /// Stores the time of a nonzero drive command that was refused as out of range. It refuses arm and reset like any
 /// other.
-void iw_permit_remember(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client);
+void iw_permit_note_command(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client);
 
 /// Stops without a latch, and ends arming. Any client may request it. `cause`: IW_CAUSE_CLIENT_STOP or
 /// IW_CAUSE_SHUTDOWN; SHUTDOWN also releases a hold.

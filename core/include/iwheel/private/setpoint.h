@@ -64,9 +64,9 @@ static inline bool iw_setpoint_due(const iw_setpoint_t *self, iw_time_us_t now_u
 }
 
 /// Advances the ramp to now, returns the pair that must be sent now, and sets the time of the next one.
-iw_pair_t iw_setpoint_take(iw_setpoint_t *self, iw_time_us_t now_us);
+iw_pair_t iw_setpoint_next(iw_setpoint_t *self, iw_time_us_t now_us);
 
-/// Returns the last pair of `iw_setpoint_take`, in the machine's frame (not inverted).
+/// Returns the last pair of `iw_setpoint_next`, in the machine's frame (not inverted).
 iw_pair_t iw_setpoint_applied(const iw_setpoint_t *self);
 
 /// Returns true if the output is zero: the last pair was zero, or a collapse or a new demand has set it to zero.

@@ -47,7 +47,7 @@ typedef enum {
 typedef struct {
     const iw_config_t *config;      ///< Configuration of the owner.
     iw_side_t side;                 ///< Side of this wheel.
-    iw_reboot_t pending_reboot;     ///< Reboot that `iw_wheel_take_reboot` has not returned yet.
+    iw_reboot_t pending_reboot;     ///< Reboot that `iw_wheel_next_reboot` has not returned yet.
     bool boot_seen;                 ///< The start of this run of the wheel was observed.
     iw_time_us_t first_us;          ///< Time of the first frame; IW_NEVER if there is none.
     iw_time_us_t offset_us;         ///< Time of the last offset message of this run, or of its start.
@@ -72,9 +72,9 @@ typedef struct {
 /// Initializes `self`. `config` must be checked, and must exist as long as `self`.
 void iw_wheel_init(iw_wheel_t *self, const iw_config_t *config, iw_side_t side, iw_time_us_t now_us);
 
-/// Receives a message of this wheel; `told` has its values. `fresh` is false in a late step, in which reception times
+/// Receives a message of this wheel; `values` has its values. `fresh` is false in a late step, in which reception times
 /// are unknown. The values are then stored, but the wheel does not become online and no standstill begins.
-void iw_wheel_receive(iw_wheel_t *self, iw_time_us_t now_us, iw_codec_kind_t kind, const iw_codec_wheel_t *told,
+void iw_wheel_receive(iw_wheel_t *self, iw_time_us_t now_us, iw_codec_kind_t kind, const iw_codec_wheel_t *values,
                       bool fresh);
 
 /// Reports that a step was late: until `wheel_silent_ms` from now missing frames do not count. Another call without a
@@ -95,7 +95,7 @@ bool iw_wheel_lost(const iw_wheel_t *self, iw_time_us_t now_us);
 uint32_t iw_wheel_rest_us(const iw_wheel_t *self, iw_time_us_t now_us);
 
 /// Returns the observation that showed a reboot since the last call, or IW_REBOOT_NONE.
-static inline iw_reboot_t iw_wheel_take_reboot(iw_wheel_t *self) {
+static inline iw_reboot_t iw_wheel_next_reboot(iw_wheel_t *self) {
     const iw_reboot_t reboot = self->pending_reboot;
     self->pending_reboot = IW_REBOOT_NONE;
     return reboot;

@@ -42,6 +42,6 @@ int32_t iw_yaw_bound(const iw_yaw_t *self, int32_t from_um_s, uint32_t growth_um
 
 /// Returns the part of a change, without sign, that stays within the limit. Call it for a change that would exceed the
 /// limit: the result is then smaller than the change.
-uint32_t iw_yaw_room(int32_t bound_um_s, int32_t from_um_s, int32_t change_um_s);
+uint32_t iw_yaw_margin(int32_t bound_um_s, int32_t from_um_s, int32_t change_um_s);
 
 #endif

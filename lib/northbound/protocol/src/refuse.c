@@ -120,7 +120,7 @@ static void say_not_at_rest(wording_t *self) {
 
 static void say_stalled(wording_t *self) {
     const iw_time_us_t waiting_us = self->seen->waiting_us;
-    const char *more = self->context->stalled_cure;
+    const char *more = self->context->stalled_fix;
     if (waiting_us == IW_NEVER) {
         number(self, "the zero setpoints were not acknowledged on the bus within ", self->seen->config->echo_ms, " ms");
     } else {
@@ -166,7 +166,7 @@ static void say_present(wording_t *self) {
         }
         iwn_text_add(&self->text, iwn_cause_name((iw_cause_t)cause));
         since(self, " was seen ", self->seen->seen_us[cause], " ms ago; ");
-        SAY(self, iwn_why_cure((iw_cause_t)cause), iwn_why_then((iw_cause_t)cause), ", and wait a second");
+        SAY(self, iwn_why_fix((iw_cause_t)cause), iwn_why_then((iw_cause_t)cause), ", and wait a second");
         return;
     }
     number(self, "zeros are still being sent because the gateway died while armed; wait ",
@@ -200,7 +200,7 @@ static void say_track(wording_t *self) {
 }
 
 static void say_bus_down(wording_t *self) {
-    SAY(self, "bus ", self->context->bus, " is ", iwn_bus_state_name(self->seen->bus), "; ", self->context->bus_cure);
+    SAY(self, "bus ", self->context->bus, " is ", iwn_bus_state_name(self->seen->bus), "; ", self->context->bus_fix);
 }
 
 static void say_timing(wording_t *self) {

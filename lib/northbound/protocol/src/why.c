@@ -34,7 +34,7 @@ static unsigned hex_digits(uint32_t number) {
 /// detail in hexadecimal, $d the detail as text, $c the client, $r its reason, $b the bus, $e the e-stop.
 typedef struct {
     const char *clause;
-    const char *cure;
+    const char *fix;
 } row_t;
 
 static const row_t rows[IW_CAUSES] = {
@@ -163,11 +163,11 @@ void iwn_why_sentence(const iw_stop_t *stop, const iwn_why_context_t *context, c
     add_doing(stop, &text);
     IWN_TEXT_JOIN(&text, "; ", manner(stop), " at ");
     add_time(stop->at_us, &text);
-    IWN_TEXT_JOIN(&text, "; ", iwn_why_cure(stop->cause), iwn_why_then(stop->cause));
+    IWN_TEXT_JOIN(&text, "; ", iwn_why_fix(stop->cause), iwn_why_then(stop->cause));
 }
 
-const char *iwn_why_cure(iw_cause_t cause) {
-    return rows[((unsigned)cause < IW_CAUSES) ? cause : IW_CAUSE_INTERNAL].cure;
+const char *iwn_why_fix(iw_cause_t cause) {
+    return rows[((unsigned)cause < IW_CAUSES) ? cause : IW_CAUSE_INTERNAL].fix;
 }
 
 const char *iwn_why_then(iw_cause_t cause) {

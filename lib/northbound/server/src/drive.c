@@ -52,7 +52,7 @@ static void drive(iwn_server_t *self, iwn_client_t *client, const iw_drive_t *wa
         return;
     }
     iwn_out_t json = iwn_server_begin_reply(self, &self->request.id);
-    iwn_tell_applied(&applied, &json);
+    iwn_write_applied(&applied, &json);
     iwn_server_send_reply(self, client, &json);
 }
 

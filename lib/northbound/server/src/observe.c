@@ -11,11 +11,11 @@ static iwn_out_t begin(iwn_server_t *self, const char *name) {
 }
 
 static void observe_bus(iwn_server_t *self, const iw_snapshot_t *seen, bool first) {
-    if (seen->bus == self->told.bus && !first) {
+    if (seen->bus == self->reported.bus && !first) {
         return;
     }
     const char *const state = iwn_bus_state_name(seen->bus);
-    self->told.bus = seen->bus;
+    self->reported.bus = seen->bus;
     iwn_target_changed(self, seen, IWN_CHANGE_BUS, state, seen->bus != IW_BUS_ACTIVE);
     iwn_out_t json = begin(self, "bus");
     iwn_out_text(&json, "state", state);
@@ -24,12 +24,12 @@ static void observe_bus(iwn_server_t *self, const iw_snapshot_t *seen, bool firs
 
 static void observe_estop(iwn_server_t *self, const iw_snapshot_t *seen, bool first) {
     const iwn_estop_t *const estop = &self->estop;
-    if (estop->answer == self->told.estop && estop->pressed_at == self->told.pressed_at && !first) {
+    if (estop->answer == self->reported.estop && estop->pressed_at == self->reported.pressed_at && !first) {
         return;
     }
     const char *const state = iwn_estop_name(estop->answer, estop->present);
-    self->told.estop = estop->answer;
-    self->told.pressed_at = estop->pressed_at;
+    self->reported.estop = estop->answer;
+    self->reported.pressed_at = estop->pressed_at;
     iwn_target_changed(self, seen, IWN_CHANGE_ESTOP, state, estop->answer != 0);
     iwn_out_t json = begin(self, "estop");
     iwn_out_text(&json, "state", state);
@@ -39,71 +39,71 @@ static void observe_estop(iwn_server_t *self, const iw_snapshot_t *seen, bool fi
     iwn_server_send_event(self, IWN_TOPIC_ESTOP, &json);
 }
 
-void iwn_server_tell_fault(iwn_server_t *self, const char *cause, bool present) {
+void iwn_server_report_fault(iwn_server_t *self, const char *cause, bool present) {
     iwn_out_t json = begin(self, "fault");
     iwn_out_text(&json, "cause", cause);
     iwn_out_bool(&json, "present", present);
     iwn_server_send_event(self, IWN_TOPIC_STOP, &json);
 }
 
-static void tell_fault(iwn_server_t *self, const iw_snapshot_t *seen, const char *cause, bool present) {
+static void report_fault(iwn_server_t *self, const iw_snapshot_t *seen, const char *cause, bool present) {
     iwn_target_changed(self, seen, IWN_CHANGE_FAULT, cause, present);
-    iwn_server_tell_fault(self, cause, present);
+    iwn_server_report_fault(self, cause, present);
 }
 
 /// The first telemetry arrives shortly after the start: until then a wheel without telemetry is not a fault.
 static uint32_t faults_of(const iwn_server_t *self, const iw_snapshot_t *seen) {
-    const bool early = self->now_us < self->told.started_us + IWN_FIRST_TELEMETRY_US;
+    const bool early = self->now_us < self->reported.started_us + IWN_FIRST_TELEMETRY_US;
     return early ? seen->present & ~(1U << IW_CAUSE_WHEEL_LOST) : seen->present;
 }
 
 /// Omits a fault `rolling` that begins too soon after the last one.
 static void observe_rolling_fault(iwn_server_t *self, const iw_snapshot_t *seen) {
-    iwn_reported_t *const told = &self->told;
-    const bool again = told->rolling_us != 0U && self->now_us - told->rolling_us < IWN_ROLLING_FAULT_US;
-    if (seen->rolling_fault == told->rolling_fault || (seen->rolling_fault && again)) {
+    iwn_reported_t *const reported = &self->reported;
+    const bool again = reported->rolling_us != 0U && self->now_us - reported->rolling_us < IWN_ROLLING_FAULT_US;
+    if (seen->rolling_fault == reported->rolling_fault || (seen->rolling_fault && again)) {
         return;
     }
-    told->rolling_fault = seen->rolling_fault;
+    reported->rolling_fault = seen->rolling_fault;
     if (seen->rolling_fault) {
-        told->rolling_us = self->now_us;
+        reported->rolling_us = self->now_us;
     }
     iwn_target_changed(self, seen, IWN_CHANGE_ROLLS_AWAY, NULL, seen->rolling_fault);
-    tell_fault(self, seen, "rolling", seen->rolling_fault);
+    report_fault(self, seen, "rolling", seen->rolling_fault);
 }
 
 /// While armed or stopping, a cause results in a stop, which is reported as a stop. This function reports the others.
 static void observe_faults(iwn_server_t *self, const iw_snapshot_t *seen) {
-    iwn_reported_t *const told = &self->told;
+    iwn_reported_t *const reported = &self->reported;
     const uint32_t present = faults_of(self, seen);
-    const uint32_t changed = present ^ told->present;
+    const uint32_t changed = present ^ reported->present;
     for (unsigned cause = 0; cause < IW_CAUSES && changed != 0U; cause++) {
         if ((changed & (1U << cause)) != 0U) {
-            tell_fault(self, seen, iwn_cause_name((iw_cause_t)cause), (present & (1U << cause)) != 0U);
+            report_fault(self, seen, iwn_cause_name((iw_cause_t)cause), (present & (1U << cause)) != 0U);
         }
     }
-    told->present = present;
-    if (seen->still_moving != told->still_moving) {
-        told->still_moving = seen->still_moving;
-        tell_fault(self, seen, "still_moving", true);
+    reported->present = present;
+    if (seen->still_moving != reported->still_moving) {
+        reported->still_moving = seen->still_moving;
+        report_fault(self, seen, "still_moving", true);
     }
-    if (seen->zeros_ending != told->zeros_ending) {
-        told->zeros_ending = seen->zeros_ending;
-        tell_fault(self, seen, "zeros_ending", seen->zeros_ending);
+    if (seen->zeros_ending != reported->zeros_ending) {
+        reported->zeros_ending = seen->zeros_ending;
+        report_fault(self, seen, "zeros_ending", seen->zeros_ending);
     }
     observe_rolling_fault(self, seen);
-    if (seen->left_behind != told->left_behind) {
-        told->left_behind = seen->left_behind;
+    if (seen->left_behind != reported->left_behind) {
+        reported->left_behind = seen->left_behind;
         iwn_target_changed(self, seen, IWN_CHANGE_LEFT_BEHIND, NULL, seen->left_behind);
-        tell_fault(self, seen, "setpoint_left", seen->left_behind);
+        report_fault(self, seen, "setpoint_left", seen->left_behind);
     }
 }
 
 static void observe_rolling(iwn_server_t *self, const iw_snapshot_t *seen) {
-    if (seen->rolling == self->told.rolling) {
+    if (seen->rolling == self->reported.rolling) {
         return;
     }
-    self->told.rolling = seen->rolling;
+    self->reported.rolling = seen->rolling;
     iwn_target_changed(self, seen, IWN_CHANGE_ROLLING, NULL, seen->rolling);
     iwn_out_t json = begin(self, "rolling");
     iwn_out_bool(&json, "present", seen->rolling);
@@ -126,10 +126,10 @@ static const char *note_client(iwn_server_t *self) {
 
 static void observe_stop(iwn_server_t *self, const iw_snapshot_t *seen) {
     iwn_stop_note_t *const note = &self->last_stop;
-    if (seen->stop->number == self->told.stop_number) {
+    if (seen->stop->number == self->reported.stop_number) {
         return;
     }
-    self->told.stop_number = seen->stop->number;
+    self->reported.stop_number = seen->stop->number;
     note->stop = *seen->stop;
     note->wall_us = iwn_target_wall_us();
     note->client_name[0] = '\0';
@@ -138,49 +138,49 @@ static void observe_stop(iwn_server_t *self, const iw_snapshot_t *seen) {
     iwn_why_sentence(&note->stop, &context, note->sentence, sizeof note->sentence);
     iwn_target_changed(self, seen, IWN_CHANGE_STOP, NULL, true);
     iwn_out_t json = begin(self, "stop");
-    iwn_tell_stop(note, self->now_us, &json);
+    iwn_write_stop(note, self->now_us, &json);
     iwn_server_send_event(self, IWN_TOPIC_STOP, &json);
 }
 
 static void observe_lease(iwn_server_t *self, const iw_snapshot_t *seen) {
     const iw_client_t holder = (seen->state == IW_STATE_ARMED) ? seen->holder : IW_CLIENT_NONE;
-    const iw_client_t former = self->told.holder;
+    const iw_client_t former = self->reported.holder;
     if (holder == former) {
         return;
     }
     const iwn_client_t *const client = iwn_server_find(self, holder);
-    self->told.holder = holder;
-    iwn_target_changed(self, seen, IWN_CHANGE_LEASE, iwn_tell_change(holder, former), holder != IW_CLIENT_NONE);
+    self->reported.holder = holder;
+    iwn_target_changed(self, seen, IWN_CHANGE_LEASE, iwn_write_change(holder, former), holder != IW_CLIENT_NONE);
     iwn_out_t json = begin(self, "lease");
-    iwn_tell_lease(&(iwn_holder_t){.client = holder, .name = (client != NULL) ? client->name : NULL}, former, &json);
+    iwn_write_lease(&(iwn_holder_t){.client = holder, .name = (client != NULL) ? client->name : NULL}, former, &json);
     iwn_server_send_event(self, IWN_TOPIC_LEASE, &json);
 }
 
 static void observe_state(iwn_server_t *self, const iw_snapshot_t *seen, bool first) {
-    iwn_reported_t *const told = &self->told;
-    const bool changed = seen->state != told->state || first;
-    if (!changed && seen->holding == told->holding) {
+    iwn_reported_t *const reported = &self->reported;
+    const bool changed = seen->state != reported->state || first;
+    if (!changed && seen->holding == reported->holding) {
         return;
     }
     if (first) {
-        told->state = seen->state;
+        reported->state = seen->state;
     }
     if (changed) {
         iwn_target_changed(self, seen, IWN_CHANGE_STATE, iwn_state_name(seen->state), true);
     }
-    if (seen->holding != told->holding) {
+    if (seen->holding != reported->holding) {
         iwn_target_changed(self, seen, IWN_CHANGE_HOLDING, NULL, seen->holding);
     }
-    told->state = seen->state;
-    told->holding = seen->holding;
+    reported->state = seen->state;
+    reported->holding = seen->holding;
     iwn_target_state(self, seen, false);
 }
 
 void iwn_server_observe(iwn_server_t *self, const iw_snapshot_t *seen) {
-    const bool first = !self->told.started;
+    const bool first = !self->reported.started;
     if (first) {
-        self->told.started = true;
-        self->told.started_us = self->now_us;
+        self->reported.started = true;
+        self->reported.started_us = self->now_us;
     }
     observe_bus(self, seen, first);
     observe_estop(self, seen, first);

@@ -42,7 +42,7 @@ static void do_watch(iwn_server_t *self, iwn_client_t *client) {
     client->rate_hz = limited ? self->rate_max_hz : (uint32_t)request->rate_hz;
     client->next_us = self->now_us;
     iwn_out_t json = iwn_server_begin_reply(self, &request->id);
-    iwn_tell_watched(client->topics, client->rate_hz, limited || client->topics != request->topics, &json);
+    iwn_write_watched(client->topics, client->rate_hz, limited || client->topics != request->topics, &json);
     iwn_server_send_reply(self, client, &json);
 }
 
@@ -67,7 +67,7 @@ static void do_arm(iwn_server_t *self, iwn_client_t *client) {
 static void reply_armed(iwn_server_t *self, iwn_client_t *client, const iw_snapshot_t *seen, const iwn_id_t *id) {
     const iwn_surroundings_t around = iwn_target_around(self, seen);
     iwn_out_t json = iwn_server_begin_reply(self, id);
-    iwn_tell_terms(seen, &around, &json);
+    iwn_write_terms(seen, &around, &json);
     iwn_target_write_terms(self, client, &json);
     iwn_server_send_reply(self, client, &json);
 }
@@ -155,7 +155,7 @@ static void do_tare(iwn_server_t *self, iwn_client_t *client) {
             const iw_force_t *const force = seen->wheel[side].force;
             iwn_target_tared(self, client, (iw_side_t)side, &window[side]);
             iwn_out_open(&json, (side == IW_LEFT) ? "left" : "right", '{');
-            iwn_tell_tare(force, &window[side], &before[side], &json);
+            iwn_write_tare(force, &window[side], &before[side], &json);
             iwn_out_close(&json, '}');
         }
     }
@@ -164,7 +164,7 @@ static void do_tare(iwn_server_t *self, iwn_client_t *client) {
 
 static void do_why(iwn_server_t *self, iwn_client_t *client) {
     iwn_out_t json = iwn_server_begin_reply(self, &self->request.id);
-    iwn_tell_stop(&self->last_stop, self->now_us, &json);
+    iwn_write_stop(&self->last_stop, self->now_us, &json);
     iwn_target_write_why(self, &json);
     iwn_server_send_reply(self, client, &json);
 }

@@ -39,7 +39,7 @@ uint32_t iwn_server_watching(iwn_server_t *self, iwn_topic_t topic) {
 iwn_out_t iwn_server_begin_reply(iwn_server_t *self, const iwn_id_t *id) {
     size_t size = 0;
     char *const line = iwn_target_line(self, &size);
-    return iwn_tell_reply(line, size, id, true);
+    return iwn_write_reply(line, size, id, true);
 }
 
 void iwn_server_send_reply(iwn_server_t *self, iwn_client_t *client, iwn_out_t *json) {
@@ -50,13 +50,13 @@ void iwn_server_send_reply(iwn_server_t *self, iwn_client_t *client, iwn_out_t *
 void iwn_server_refuse(iwn_server_t *self, iwn_client_t *client, const iwn_id_t *id) {
     size_t size = 0;
     char *const line = iwn_target_line(self, &size);
-    iwn_target_reply(self, client, line, iwn_tell_refusal(line, size, id, &self->refusal));
+    iwn_target_reply(self, client, line, iwn_write_refusal(line, size, id, &self->refusal));
 }
 
 iwn_out_t iwn_server_begin_event(iwn_server_t *self, const char *name) {
     size_t size = 0;
     char *const line = iwn_target_line(self, &size);
-    return iwn_tell_event(line, size, name);
+    return iwn_write_event(line, size, name);
 }
 
 /// Ends an event and sends it to the watchers of the topic.
@@ -75,7 +75,7 @@ void iwn_server_send_event(iwn_server_t *self, iwn_topic_t topic, iwn_out_t *jso
 }
 
 void iwn_server_write_hello(iwn_server_t *self, const iwn_client_t *client, iwn_out_t *json) {
-    iwn_tell_hello(
+    iwn_write_hello(
         &(iwn_hello_t){self->version, self->bus, iw_gateway_state(self->core), client->id, client->watches_only}, json);
 }
 
@@ -89,9 +89,9 @@ void iwn_server_hello(iwn_server_t *self, iwn_client_t *client) {
 
 void iwn_server_write_status(iwn_server_t *self, const iw_snapshot_t *seen, iwn_out_t *json) {
     const iwn_surroundings_t around = iwn_target_around(self, seen);
-    iwn_tell_machine(seen, &around, json);
+    iwn_write_machine(seen, &around, json);
     iwn_target_write_assumptions(self, seen, json);
-    iwn_tell_rest(seen, &around, json);
+    iwn_write_rest(seen, &around, json);
 }
 
 static bool is_periodic(const iwn_client_t *client) {
@@ -125,7 +125,7 @@ static uint8_t find_due(iwn_server_t *self) {
 static void send_force(iwn_server_t *self, const iw_snapshot_t *seen) {
     const iwn_surroundings_t around = iwn_target_around(self, seen);
     iwn_out_t json = iwn_server_begin_event(self, "force");
-    iwn_tell_force(seen, &around, &json);
+    iwn_write_force(seen, &around, &json);
     send_event(self, IWN_TOPIC_FORCE, true, &json);
 }
 

@@ -34,7 +34,7 @@ int iwl_bus_fd(const iwl_backend_store_t *bus);
 void iwl_bus_poll(iwl_backend_store_t *bus, iw_time_us_t now_us);
 /// Reports whether the last wait found the descriptor readable. Without such reports the bus reads its events in every
 /// step.
-void iwl_bus_waited(iwl_backend_store_t *bus, bool told);
+void iwl_bus_waited(iwl_backend_store_t *bus, bool woken);
 /// Returns the time at which `poll` must be called; IW_NEVER if it need not.
 iw_time_us_t iwl_bus_next_us(const iwl_backend_store_t *bus);
 /// Implements `send` of iw_hal_t.

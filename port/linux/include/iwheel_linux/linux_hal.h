@@ -50,7 +50,7 @@ typedef struct {
 
 /// Reports the result of a wait for both descriptors. Calling it directly after the wait saves system calls: the next
 /// reading of the e-stop reads no edges, and the bus reads no interface events until the next wait.
-void iwl_hal_waited(iwl_hal_t *self, iwl_reported_t told);
+void iwl_hal_waited(iwl_hal_t *self, iwl_reported_t woken);
 
 /// Polls bus and e-stop. Call it before every step.
 void iwl_hal_poll(iwl_hal_t *self, iw_time_us_t now_us);

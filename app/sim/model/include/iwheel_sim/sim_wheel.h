@@ -97,10 +97,10 @@ void sim_wheel_slow(sim_wheel_t *self, uint32_t permille);
 /// Accepts a setpoint for this wheel that was on the bus.
 void sim_wheel_receive(sim_wheel_t *self, iw_time_us_t now_us, const iw_codec_setpoint_t *setpoint);
 
-/// A message that a wheel sends; `told` has its values.
+/// A message that a wheel sends; `values` has its values.
 typedef struct {
     iw_codec_kind_t kind;
-    iw_codec_wheel_t told;
+    iw_codec_wheel_t values;
 } sim_message_t;
 
 /// Performs the action that is due at `self->next_us`. The caller has checked that it is due. Returns true

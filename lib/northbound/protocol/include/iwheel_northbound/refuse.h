@@ -19,8 +19,8 @@ typedef struct {
     const char *estop;         ///< Name of the e-stop line; of two, the one in question.
     int estop_answer;          ///< Last result: 0 released, 1 pressed, negative unreadable.
     const char *bus;           ///< Name of the bus.
-    const char *bus_cure;      ///< Fix for a bus that is down.
-    const char *stalled_cure;  ///< Further fix for a frame without acknowledgement; NULL if there is none.
+    const char *bus_fix;       ///< Fix for a bus that is down.
+    const char *stalled_fix;   ///< Further fix for a frame without acknowledgement; NULL if there is none.
     const char *timing;        ///< Fault of the bit timing, and its fix.
     const char *contradiction; ///< Message about the assumption `seen->doubt`, with the consequence.
     const char *configure;     ///< Place of the configuration: "under [wheels] in the configuration".

@@ -29,7 +29,7 @@ typedef struct {
 void iwn_why_sentence(const iw_stop_t *stop, const iwn_why_context_t *context, char *out_sentence, size_t size);
 
 /// Returns the fix for a cause, also for refusals.
-const char *iwn_why_cure(iw_cause_t cause);
+const char *iwn_why_fix(iw_cause_t cause);
 
 /// Returns the next step after the fix: the reset if the cause latches. Separate, because most causes have it.
 const char *iwn_why_then(iw_cause_t cause);

@@ -14,8 +14,8 @@
 #define IWHEEL_SERVER_SERVER_H
 
 #include "iwheel/gateway.h"
+#include "iwheel_northbound/contents.h"
 #include "iwheel_northbound/refuse.h"
-#include "iwheel_northbound/tell.h"
 
 /// A repeated software e-stop within this time while its latch holds is answered and changes nothing.
 #define IWN_ESTOP_AGAIN_US 100000U
@@ -77,7 +77,7 @@ typedef struct iwn_server {
     // The caller reads these members.
     iw_time_us_t stopped_us, estopped_us; ///< Time of the last request of a client; 0 if there was none.
     iw_client_t stopped_by, estopped_by;  ///< Client of that request.
-    iwn_reported_t told;
+    iwn_reported_t reported;
     iw_snapshot_t seen;        ///< Snapshot of iwn_server_look.
     iwn_request_t request;     ///< The caller sets it before iwn_server_request.
     iwn_stop_note_t last_stop; ///< The last stop, with its sentence.
@@ -137,7 +137,7 @@ iwn_out_t iwn_server_begin_event(iwn_server_t *self, const char *name);
 void iwn_server_send_event(iwn_server_t *self, iwn_topic_t topic, iwn_out_t *json);
 
 /// Reports that a fault has begun or ended.
-void iwn_server_tell_fault(iwn_server_t *self, const char *cause, bool present);
+void iwn_server_report_fault(iwn_server_t *self, const char *cause, bool present);
 
 /// Writes the fields of a status into an open object.
 void iwn_server_write_status(iwn_server_t *self, const iw_snapshot_t *seen, iwn_out_t *json);

@@ -78,8 +78,8 @@ typedef enum {
     IWN_CHANGE_ROLLING,     ///< `present`: a wheel turns while nothing is sent to it.
     IWN_CHANGE_ROLLS_AWAY,  ///< `present`: the same shortly after the last setpoint, which is a fault.
     IWN_CHANGE_STOP,        ///< `self->last_stop` is the new stop.
-    IWN_CHANGE_LEASE,       ///< `word`: gained, moved or lost; `self->told.holder` is the present holder.
-    IWN_CHANGE_STATE,       ///< `word`: the new state; `self->told.state` is the state before.
+    IWN_CHANGE_LEASE,       ///< `word`: gained, moved or lost; `self->reported.holder` is the present holder.
+    IWN_CHANGE_STATE,       ///< `word`: the new state; `self->reported.state` is the state before.
     IWN_CHANGE_HOLDING,     ///< `present`: zeros hold the wheels.
 } iwn_change_t;
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Forces, with source and quality of their offset.
-#include "tell_force.h"
+#include "contents_force.h"
 
 /// Source and quality of the offset.
 typedef struct {
@@ -62,28 +62,28 @@ static void write_known_bool(iwn_out_t *json, const char *name, bool known, bool
     }
 }
 
-static bool is_heard(const iw_force_t *force, iw_time_us_t now_us) {
+static bool is_fresh(const iw_force_t *force, iw_time_us_t now_us) {
     return force->raw_us != IW_NEVER && now_us - force->raw_us < IW_FORCE_STALE_US;
 }
 
-void iwn_tell_wheel_force(const iw_snapshot_t *seen, const iwn_surroundings_t *around, iw_side_t side, bool alone,
-                          iwn_out_t *json) {
+void iwn_write_wheel_force(const iw_snapshot_t *seen, const iwn_surroundings_t *around, iw_side_t side, bool alone,
+                           iwn_out_t *json) {
     const size_t force_prefix = alone ? sizeof "force_" - 1U : 0U;
     const size_t zero_prefix = alone ? sizeof "offset_" - 1U : 0U;
     const iw_force_t *force = seen->wheel[side].force;
     const iw_force_validity_t validity = iw_snapshot_force_validity(seen, side);
-    const bool heard = is_heard(force, seen->at_us);
+    const bool fresh = is_fresh(force, seen->at_us);
     const iwn_zero_note_t *noted = &around->zero[side];
     const zero_t zero = describe_zero(seen, around, side);
-    iwn_out_known32(json, &"force_raw"[force_prefix], heard, force -> raw);
-    iwn_out_known32(json, &"force_raw_mN"[force_prefix], heard, iw_force_raw_mN(force));
+    iwn_out_known32(json, &"force_raw"[force_prefix], fresh, force -> raw);
+    iwn_out_known32(json, &"force_raw_mN"[force_prefix], fresh, iw_force_raw_mN(force));
     iwn_out_known32(json, &"force_offset_mN"[force_prefix], force -> provenance != IW_OFFSET_NONE, force -> offset_mN);
     iwn_out_known32(json, &"force_net_mN"[force_prefix], validity == IW_FORCE_VALID, iw_force_net_mN(force));
     iwn_out_text(json, &"force_validity"[force_prefix], iwn_force_validity_name(validity));
     if (alone) {
         iwn_out_bool(json, "saturated", validity == IW_FORCE_SATURATED);
     }
-    iwn_tell_age(&"force_age_ms"[force_prefix], seen -> at_us, force -> raw_us, json);
+    iwn_write_age(&"force_age_ms"[force_prefix], seen -> at_us, force -> raw_us, json);
     iwn_out_text(json, &"offset_provenance"[zero_prefix], zero.word);
     if (!alone) {
         iwn_out_text(json, "offset_origin", (noted->from != IW_OFFSET_NONE) ? iwn_provenance_name(noted->from) : NULL);
@@ -102,11 +102,11 @@ void iwn_tell_wheel_force(const iw_snapshot_t *seen, const iwn_surroundings_t *a
     }
 }
 
-void iwn_tell_force(const iw_snapshot_t *seen, const iwn_surroundings_t *around, iwn_out_t *json) {
+void iwn_write_force(const iw_snapshot_t *seen, const iwn_surroundings_t *around, iwn_out_t *json) {
     iwn_out_int(json, "t_us", (int64_t)seen->at_us);
     for (unsigned side = 0; side < IW_SIDES; side++) {
         iwn_out_open(json, (side == IW_LEFT) ? "left" : "right", '{');
-        iwn_tell_wheel_force(seen, around, (iw_side_t)side, true, json);
+        iwn_write_wheel_force(seen, around, (iw_side_t)side, true, json);
         iwn_out_close(json, '}');
     }
 }

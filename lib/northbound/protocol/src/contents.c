@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-#include "iwheel_northbound/tell.h"
+#include "iwheel_northbound/contents.h"
 
-#include "tell_force.h"
+#include "contents_force.h"
 
-void iwn_tell_age(const char *name, iw_time_us_t now_us, iw_time_us_t then_us, iwn_out_t *json) {
+void iwn_write_age(const char *name, iw_time_us_t now_us, iw_time_us_t then_us, iwn_out_t *json) {
     const bool known = then_us != IW_NEVER && then_us <= now_us;
     iwn_out_known(json, name, known, known ? (int64_t)((now_us - then_us) / IW_US_PER_MS) : 0);
 }
@@ -28,25 +28,25 @@ static bool is_distance_known(const iw_snapshot_t *seen) {
 
 static void write_motion(const iw_snapshot_t *seen, iw_side_t side, iwn_out_t *json) {
     const iw_snapshot_wheel_t *wheel = &seen->wheel[side];
-    const bool heard = wheel->heard;
+    const bool online = wheel->heard;
     const bool following = seen->demand == IW_DEMAND_FOLLOW;
     const bool sending = seen->demand != IW_DEMAND_SILENCE;
     const iw_command_t applied = seen->applied.wheel[side];
     const iw_command_t wanted = seen->target.wheel[side];
-    iwn_out_bool(json, "heard", heard);
-    if (heard) {
+    iwn_out_bool(json, "heard", online);
+    if (online) {
         iwn_out_bool(json, "at_rest", wheel->at_rest);
     } else {
         iwn_out_null(json, "at_rest");
     }
-    iwn_out_known32(json, "speed_rpm", heard, wheel->told->speed.speed_rpm);
-    iwn_out_known32(json, "speed_mm_s", heard && is_speed_known(seen), wheel->speed_mm_s);
-    iwn_out_known32(json, "acceleration_raw", heard, wheel->told->speed.acceleration_raw);
+    iwn_out_known32(json, "speed_rpm", online, wheel->told->speed.speed_rpm);
+    iwn_out_known32(json, "speed_mm_s", online && is_speed_known(seen), wheel->speed_mm_s);
+    iwn_out_known32(json, "acceleration_raw", online, wheel->told->speed.acceleration_raw);
     iwn_out_known32(json, "commanded_mm_s", following, wanted.speed_mm_s);
     iwn_out_known32(json, "commanded_mA", following, wanted.current_mA);
     iwn_out_known32(json, "applied_mm_s", sending, applied.speed_mm_s);
     iwn_out_known32(json, "applied_mA", sending, applied.current_mA);
-    iwn_tell_age("speed_age_ms", seen->at_us, wheel->speed_us, json);
+    iwn_write_age("speed_age_ms", seen->at_us, wheel->speed_us, json);
 }
 
 static void write_condition(const iw_snapshot_t *seen, iw_side_t side, iwn_out_t *json) {
@@ -62,7 +62,7 @@ static void write_condition(const iw_snapshot_t *seen, iw_side_t side, iwn_out_t
     iwn_out_known32(json, "cpu_percent", cpu, status->cpu_percent);
     iwn_out_known(json, "ticks", ever, wheel->ticks);
     iwn_out_known(json, "distance_mm", ever && is_distance_known(seen), wheel->ticks * wheel->nm_per_tick / 1000000);
-    iwn_tell_age("status_age_ms", seen->at_us, wheel->status_us, json);
+    iwn_write_age("status_age_ms", seen->at_us, wheel->status_us, json);
     iwn_out_int(json, "reboots", wheel->reboots);
     iwn_out_open(json, "valid", '{');
     iwn_out_bool(json, "speed", wheel->heard);
@@ -81,7 +81,7 @@ static void write_wheel(const iw_snapshot_t *seen, const iwn_surroundings_t *aro
     iwn_out_open(json, (side == IW_LEFT) ? "left" : "right", '{');
     write_motion(seen, side, json);
     write_condition(seen, side, json);
-    iwn_tell_wheel_force(seen, around, side, false, json);
+    iwn_write_wheel_force(seen, around, side, false, json);
     iwn_out_close(json, '}');
 }
 
@@ -98,7 +98,7 @@ static void write_pose(const iw_snapshot_t *seen, iwn_out_t *json) {
     iwn_out_known32(json, "z_mm", fresh, pose->z_mm);
     iwn_out_known32(json, "psi_mrad", fresh, pose->psi_mrad);
     iwn_out_bool(json, "limited", fresh && (at_limit(pose->x_mm) || at_limit(pose->y_mm) || at_limit(pose->z_mm)));
-    iwn_tell_age("age_ms", seen->at_us, seen->pose_us, json);
+    iwn_write_age("age_ms", seen->at_us, seen->pose_us, json);
     iwn_out_close(json, '}');
 }
 
@@ -155,7 +155,7 @@ static void write_causes(const char *name, uint32_t causes, iwn_out_t *json) {
     iwn_out_close(json, ']');
 }
 
-void iwn_tell_machine(const iw_snapshot_t *seen, const iwn_surroundings_t *around, iwn_out_t *json) {
+void iwn_write_machine(const iw_snapshot_t *seen, const iwn_surroundings_t *around, iwn_out_t *json) {
     const bool stopped = seen->state == IW_STATE_STOPPING || seen->state == IW_STATE_LATCHED;
     iwn_out_int(json, "t_us", (int64_t)seen->at_us);
     iwn_out_known(json, "wall_us", around->wall_us != IWN_WALL_UNKNOWN, around->wall_us);
@@ -203,7 +203,7 @@ static void write_counters(const iw_snapshot_t *seen, iwn_out_t *json) {
     iwn_out_close(json, '}');
 }
 
-void iwn_tell_warnings(const iwn_surroundings_t *around, iwn_out_t *json) {
+void iwn_write_warnings(const iwn_surroundings_t *around, iwn_out_t *json) {
     iwn_out_open(json, "warnings", '[');
     for (uint32_t i = 0; i < around->warnings; i++) {
         iwn_out_text(json, NULL, around->warning[i]);
@@ -211,7 +211,7 @@ void iwn_tell_warnings(const iwn_surroundings_t *around, iwn_out_t *json) {
     iwn_out_close(json, ']');
 }
 
-void iwn_tell_rest(const iw_snapshot_t *seen, const iwn_surroundings_t *around, iwn_out_t *json) {
+void iwn_write_rest(const iw_snapshot_t *seen, const iwn_surroundings_t *around, iwn_out_t *json) {
     write_budget(seen, json);
     write_pair(seen, json);
     write_counters(seen, json);
@@ -220,10 +220,10 @@ void iwn_tell_rest(const iw_snapshot_t *seen, const iwn_surroundings_t *around, 
     iwn_out_bool(json, "rolling", seen->rolling);
     iwn_out_bool(json, "listen_only", seen->config->listen_only);
     iwn_out_bool(json, "shutting_down", around->shutting_down);
-    iwn_tell_warnings(around, json);
+    iwn_write_warnings(around, json);
 }
 
-void iwn_tell_stop(const iwn_stop_note_t *note, iw_time_us_t now_us, iwn_out_t *json) {
+void iwn_write_stop(const iwn_stop_note_t *note, iw_time_us_t now_us, iwn_out_t *json) {
     const iw_stop_t *stop = &note->stop;
     const bool any = stop->number > 0U;
     iwn_out_int(json, "number", stop->number);
@@ -238,6 +238,6 @@ void iwn_tell_stop(const iwn_stop_note_t *note, iw_time_us_t now_us, iwn_out_t *
     iwn_out_known32(json, "applied_right_mm_s", any, stop->applied.wheel[IW_RIGHT].speed_mm_s);
     iwn_out_known(json, "at_us", any, (int64_t)stop->at_us);
     iwn_out_known(json, "wall_us", any && note->wall_us != IWN_WALL_UNKNOWN, note->wall_us);
-    iwn_tell_age("age_ms", now_us, any ? stop->at_us : IW_NEVER, json);
+    iwn_write_age("age_ms", now_us, any ? stop->at_us : IW_NEVER, json);
     iwn_out_text(json, "sentence", note->sentence);
 }

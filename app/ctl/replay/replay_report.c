@@ -31,8 +31,8 @@ static void name_event(const char *what, char out_name[16]) {
     out_name[i] = '\0';
 }
 
-__attribute__((format(printf, 4, 5))) static void tell(const replay_t *self, iw_time_us_t at_us, const char *what,
-                                                       const char *format, ...) {
+__attribute__((format(printf, 4, 5))) static void report(const replay_t *self, iw_time_us_t at_us, const char *what,
+                                                         const char *format, ...) {
     char text[TEXT_SIZE];
     char event[16];
     va_list list;
@@ -66,16 +66,16 @@ void replay_note(const replay_out_t *out, const char *format, ...) {
     }
 }
 
-static void tell_wheels(replay_t *self, const iw_snapshot_t *seen) {
+static void report_wheels(replay_t *self, const iw_snapshot_t *seen) {
     for (unsigned side = 0; side < IW_SIDES; side++) {
-        const bool heard = seen->wheel[side].heard;
+        const bool online = seen->wheel[side].heard;
         const iw_force_validity_t force = iw_snapshot_force_validity(seen, (iw_side_t)side);
-        if (heard != self->heard[side]) {
-            tell(self, self->now_us, "wheel", "%s %s", text_side(side), heard ? "online" : "offline");
-            self->heard[side] = heard;
+        if (online != self->online[side]) {
+            report(self, self->now_us, "wheel", "%s %s", text_side(side), online ? "online" : "offline");
+            self->online[side] = online;
         }
         if (force != self->force[side]) {
-            tell(self, self->now_us, "force", "%s: %s", text_side(side), iwn_force_validity_name(force));
+            report(self, self->now_us, "force", "%s: %s", text_side(side), iwn_force_validity_name(force));
             self->force[side] = force;
         }
     }
@@ -85,19 +85,19 @@ static void tell_assumptions(replay_t *self, const iw_snapshot_t *seen) {
     for (unsigned item = 0; item < IW_ASSUMPTION_ITEMS; item++) {
         const iw_assumption_entry_t *entry = &seen->assumed[item];
         if (entry->state != self->assumptions[item].state) {
-            tell(self, self->now_us, "assumption", "%s: %s by the %s (figure %" PRId32 ")",
-                 iwn_assumption_item_name((iw_assumption_item_t)item), iwn_assumption_state_name(entry->state),
-                 iwn_source_name(entry->source), entry->figure);
+            report(self, self->now_us, "assumption", "%s: %s by the %s (figure %" PRId32 ")",
+                   iwn_assumption_item_name((iw_assumption_item_t)item), iwn_assumption_state_name(entry->state),
+                   iwn_source_name(entry->source), entry->figure);
         }
         self->assumptions[item] = *entry;
     }
 }
 
-static void tell_causes(replay_t *self, uint32_t present) {
+static void report_causes(replay_t *self, uint32_t present) {
     for (unsigned cause = 0; cause < IW_CAUSES; cause++) {
         if (((present ^ self->present) & (1U << cause)) != 0U) {
-            tell(self, self->now_us, "fault", "%s%s", iwn_cause_name((iw_cause_t)cause),
-                 ((present & (1U << cause)) != 0U) ? "" : " is gone");
+            report(self, self->now_us, "fault", "%s%s", iwn_cause_name((iw_cause_t)cause),
+                   ((present & (1U << cause)) != 0U) ? "" : " is gone");
         }
     }
     self->present = present;
@@ -113,37 +113,37 @@ static void tell_stop(replay_t *self, const iw_stop_t *stop) {
     (void)snprintf(client, sizeof client, "client %u", (unsigned)who);
     const iwn_why_context_t context = {.client = client, .estop = self->estop_name, .bus = self->bus_name};
     iwn_why_sentence(stop, &context, sentence, sizeof sentence);
-    tell(self, self->now_us, "stop", "%u: %s: %s", (unsigned)stop->number, iwn_cause_name(stop->cause), sentence);
+    report(self, self->now_us, "stop", "%u: %s: %s", (unsigned)stop->number, iwn_cause_name(stop->cause), sentence);
     self->stop_number = stop->number;
     self->drive_client = IW_CLIENT_NONE;
 }
 
-static void tell_arming(replay_t *self, const iw_snapshot_t *seen) {
+static void report_arming(replay_t *self, const iw_snapshot_t *seen) {
     if (self->arming && !seen->arming && seen->state != IW_STATE_ARMED) {
-        tell(self, self->now_us, "arm", "refused: %s", iwn_error_name(iwn_error_of(seen->arm_refusal)));
+        report(self, self->now_us, "arm", "refused: %s", iwn_error_name(iwn_error_of(seen->arm_refusal)));
     }
     self->arming = seen->arming;
 }
 
 static void tell_state(replay_t *self, iw_state_t state) {
     if (state != self->state) {
-        tell(self, self->now_us, "state", "%s", iwn_state_name(state));
+        report(self, self->now_us, "state", "%s", iwn_state_name(state));
         self->state = state;
         self->drive_client = IW_CLIENT_NONE;
     }
 }
 
-void replay_tell_step(replay_t *self) {
+void replay_report_step(replay_t *self) {
     const iw_snapshot_t seen = replay_look(self);
-    tell_wheels(self, &seen);
+    report_wheels(self, &seen);
     tell_assumptions(self, &seen);
-    tell_causes(self, seen.present);
+    report_causes(self, seen.present);
     tell_stop(self, seen.stop);
-    tell_arming(self, &seen);
+    report_arming(self, &seen);
     tell_state(self, seen.state);
 }
 
-static void tell_drive(replay_t *self, const blackbox_entry_t *entry, const char *result) {
+static void report_drive(replay_t *self, const blackbox_entry_t *entry, const char *result) {
     const blackbox_drive_t *drive = &entry->as.drive;
     const bool same = self->drive_client == entry->number && self->drive_refusal == entry->b &&
                       memcmp(self->drive.speed_mm_s, drive->speed_mm_s, sizeof drive->speed_mm_s) == 0 &&
@@ -151,14 +151,14 @@ static void tell_drive(replay_t *self, const blackbox_entry_t *entry, const char
     if (same) {
         return;
     }
-    tell(self, entry->at_us, "drive", "client %u: left %" PRId32 " mm/s, right %" PRId32 " mm/s: %s",
-         (unsigned)entry->number, drive->speed_mm_s[IW_LEFT], drive->speed_mm_s[IW_RIGHT], result);
+    report(self, entry->at_us, "drive", "client %u: left %" PRId32 " mm/s, right %" PRId32 " mm/s: %s",
+           (unsigned)entry->number, drive->speed_mm_s[IW_LEFT], drive->speed_mm_s[IW_RIGHT], result);
     self->drive = *drive;
     self->drive_client = entry->number;
     self->drive_refusal = entry->b;
 }
 
-void replay_tell_request(replay_t *self, const blackbox_entry_t *entry, iw_refusal_t refusal) {
+void replay_report_request(replay_t *self, const blackbox_entry_t *entry, iw_refusal_t refusal) {
     char result[96];
     const char *name = (refusal == IW_REFUSE_NONE) ? "accepted" : iwn_error_name(iwn_error_of(refusal));
     const bool same = (uint8_t)refusal == entry->b || entry->kind == (uint8_t)BLACKBOX_TARE;
@@ -169,57 +169,57 @@ void replay_tell_request(replay_t *self, const blackbox_entry_t *entry, iw_refus
                    same ? "" : ")");
     switch (entry->kind) {
     case BLACKBOX_DRIVE:
-        tell_drive(self, entry, result);
+        report_drive(self, entry, result);
         break;
     case BLACKBOX_ARM:
-        tell(self, entry->at_us, "arm", "client %u%s: %s", (unsigned)entry->number,
-             (entry->a != 0U) ? ", takeover" : "", result);
+        report(self, entry->at_us, "arm", "client %u%s: %s", (unsigned)entry->number,
+               (entry->a != 0U) ? ", takeover" : "", result);
         break;
     case BLACKBOX_RESET:
-        tell(self, entry->at_us, "reset", "client %u: %s", (unsigned)entry->number, result);
+        report(self, entry->at_us, "reset", "client %u: %s", (unsigned)entry->number, result);
         break;
     case BLACKBOX_RELEASE:
-        tell(self, entry->at_us, "release", "client %u: %s", (unsigned)entry->number, result);
+        report(self, entry->at_us, "release", "client %u: %s", (unsigned)entry->number, result);
         break;
     case BLACKBOX_STOP:
-        tell(self, entry->at_us, "stop asked", "%s", iwn_cause_name((iw_cause_t)entry->a));
+        report(self, entry->at_us, "stop asked", "%s", iwn_cause_name((iw_cause_t)entry->a));
         break;
     case BLACKBOX_TARE:
-        tell(self, entry->at_us, "tare", "%s", text_side((entry->a == (uint8_t)IW_RIGHT) ? IW_RIGHT : IW_LEFT));
+        report(self, entry->at_us, "tare", "%s", text_side((entry->a == (uint8_t)IW_RIGHT) ? IW_RIGHT : IW_LEFT));
         break;
     default:
-        tell(self, entry->at_us, "estop", "client %u", (unsigned)entry->number);
+        report(self, entry->at_us, "estop", "client %u", (unsigned)entry->number);
         break;
     }
 }
 
-void replay_tell_answer(const replay_t *self, const blackbox_entry_t *entry) {
+void replay_report_answer(const replay_t *self, const blackbox_entry_t *entry) {
     switch (entry->kind) {
     case BLACKBOX_ESTOP:
         if ((int)entry->as.value != self->estop) {
-            tell(self, entry->at_us, "e-stop", "%s", iwn_estop_name((int)entry->as.value, true));
+            report(self, entry->at_us, "e-stop", "%s", iwn_estop_name((int)entry->as.value, true));
         }
         break;
     case BLACKBOX_BUS:
         if ((iw_bus_state_t)entry->a != self->bus) {
-            tell(self, entry->at_us, "bus", "%s", iwn_bus_state_name((iw_bus_state_t)entry->a));
+            report(self, entry->at_us, "bus", "%s", iwn_bus_state_name((iw_bus_state_t)entry->a));
         }
         break;
     default:
-        tell(self, entry->at_us, "machine", "was suspended for %" PRId64 " ms", entry->as.value / 1000);
+        report(self, entry->at_us, "machine", "was suspended for %" PRId64 " ms", entry->as.value / 1000);
         break;
     }
 }
 
-void replay_tell_difference(const replay_t *self, const blackbox_entry_t *entry) {
+void replay_report_difference(const replay_t *self, const blackbox_entry_t *entry) {
     if (entry->kind == (uint8_t)BLACKBOX_STATE) {
-        tell(self, entry->at_us, "DIFFERENT", "state %s, when it was recorded %s",
-             iwn_state_name(iw_gateway_state(&self->gateway)), iwn_state_name((iw_state_t)entry->a));
+        report(self, entry->at_us, "DIFFERENT", "state %s, when it was recorded %s",
+               iwn_state_name(iw_gateway_state(&self->gateway)), iwn_state_name((iw_state_t)entry->a));
     } else {
         const iw_stop_t *stop = replay_look(self).stop;
-        tell(self, entry->at_us, "DIFFERENT", "last stop %s (%u), when it was recorded %s (%" PRId64 ")",
-             iwn_cause_name(stop->cause), (unsigned)stop->detail, iwn_cause_name((iw_cause_t)entry->a),
-             entry->as.value);
+        report(self, entry->at_us, "DIFFERENT", "last stop %s (%u), when it was recorded %s (%" PRId64 ")",
+               iwn_cause_name(stop->cause), (unsigned)stop->detail, iwn_cause_name((iw_cause_t)entry->a),
+               entry->as.value);
     }
 }
 

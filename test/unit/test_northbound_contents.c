@@ -3,7 +3,7 @@
 #include "gateway_rig.h"
 #include "unit.h"
 
-#include "iwheel_northbound/tell.h"
+#include "iwheel_northbound/contents.h"
 
 #include <string.h>
 
@@ -44,8 +44,8 @@ static void finish(void) {
 
 static void status(void) {
     const iw_snapshot_t seen = snapshot();
-    iwn_tell_machine(&seen, &around, &json);
-    iwn_tell_rest(&seen, &around, &json);
+    iwn_write_machine(&seen, &around, &json);
+    iwn_write_rest(&seen, &around, &json);
     finish();
 }
 
@@ -102,7 +102,7 @@ TEST(test_stop_without_a_time_of_day_has_its_age) {
     gateway_rig_run(&rig, 500000U);
     const iw_snapshot_t seen = snapshot();
     iwn_stop_note_t note = {.stop = *seen.stop, .wall_us = IWN_WALL_UNKNOWN, .sentence = "pressed"};
-    iwn_tell_stop(&note, rig.now_us, &json);
+    iwn_write_stop(&note, rig.now_us, &json);
     finish();
     assert_says("\"cause\":\"estop_line\"");
     assert_says("\"wall_us\":null");
@@ -111,7 +111,7 @@ TEST(test_stop_without_a_time_of_day_has_its_age) {
 
 TEST(test_stop_that_never_happened_has_only_its_number) {
     const iwn_stop_note_t none = {.wall_us = IWN_WALL_UNKNOWN};
-    iwn_tell_stop(&none, rig.now_us, &json);
+    iwn_write_stop(&none, rig.now_us, &json);
     finish();
     assert_says("\"number\":0,\"cause\":null,\"side\":null,\"detail\":null");
     assert_says("\"at_us\":null,\"wall_us\":null,\"age_ms\":null");
@@ -127,8 +127,8 @@ TEST(test_lease_event_has_gained_moved_or_lost) {
                 {IW_CLIENT_NONE, 8, "\"change\":\"lost\",\"holder\":null,\"name\":null,\"former\":8"}};
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
         const iwn_holder_t holder = {.client = rows[i].holder, .name = "me"};
-        json = iwn_tell_event(text, sizeof text, "lease");
-        iwn_tell_lease(&holder, rows[i].former, &json);
+        json = iwn_write_event(text, sizeof text, "lease");
+        iwn_write_lease(&holder, rows[i].former, &json);
         finish();
         assert_says(rows[i].words);
     }
@@ -138,10 +138,10 @@ TEST(test_reply_that_does_not_fit_is_empty) {
     const iwn_id_t id = {.kind = IWN_ID_NUMBER, .number = 5};
     const iwn_refusal_t refusal = {.error = IWN_BUSY, .message = "somebody else drives"};
     char line[128];
-    const size_t length = iwn_tell_refusal(line, sizeof line, &id, &refusal);
+    const size_t length = iwn_write_refusal(line, sizeof line, &id, &refusal);
     TEST_ASSERT_EQUAL_STRING_LEN("{\"id\":5,\"ok\":false,\"error\":\"busy\",\"message\":\"somebody else drives\"}\n",
                                  line, length);
     for (size_t size = 0; size < length; size++) {
-        TEST_ASSERT_EQUAL_size_t(0, iwn_tell_refusal(line, size, &id, &refusal));
+        TEST_ASSERT_EQUAL_size_t(0, iwn_write_refusal(line, size, &id, &refusal));
     }
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "mqtt_tell.h"
+#include "mqtt_contents.h"
 
 #include "iwheel_northbound/json_out.h"
 
@@ -48,7 +48,7 @@ static size_t end(iwn_out_t *out) {
     return (length > 0U) ? length - 1U : 0U;
 }
 
-size_t mqtt_tell_state(const char *boot, const iwc_message_t *state, mqtt_buffer_t buffer) {
+size_t mqtt_write_state(const char *boot, const iwc_message_t *state, mqtt_buffer_t buffer) {
     iwn_out_t out = begin(buffer);
     iwn_out_text(&out, "boot", boot);
     return join(&out, buffer, state->text, state->length, 1);
@@ -64,8 +64,8 @@ static iwn_out_t begin_event(const char *boot, uint64_t number, int64_t wall_us,
     return out;
 }
 
-size_t mqtt_tell_event(const char *boot, uint64_t number, int64_t wall_us, const iwc_message_t *event,
-                       mqtt_buffer_t buffer) {
+size_t mqtt_write_event(const char *boot, uint64_t number, int64_t wall_us, const iwc_message_t *event,
+                        mqtt_buffer_t buffer) {
     iwn_out_t out = begin_event(boot, number, wall_us, buffer);
     return join(&out, buffer, event->text, event->length, 1);
 }
@@ -80,8 +80,8 @@ static void copy(const iwc_message_t *message, const char *path, const char *nam
     }
 }
 
-size_t mqtt_tell_missed_stop(const char *boot, uint64_t number, int64_t wall_us, const iwc_message_t *why,
-                             mqtt_buffer_t buffer) {
+size_t mqtt_write_missed_stop(const char *boot, uint64_t number, int64_t wall_us, const iwc_message_t *why,
+                              mqtt_buffer_t buffer) {
     static const char *const fields[] = {"number",
                                          "cause",
                                          "side",
@@ -107,8 +107,8 @@ size_t mqtt_tell_missed_stop(const char *boot, uint64_t number, int64_t wall_us,
     return end(&out);
 }
 
-size_t mqtt_tell_answer(const char *boot, uint64_t now_us, const mqtt_order_t *order, const iwc_message_t *reply,
-                        mqtt_buffer_t buffer) {
+size_t mqtt_write_answer(const char *boot, uint64_t now_us, const mqtt_order_t *order, const iwc_message_t *reply,
+                         mqtt_buffer_t buffer) {
     iwn_out_t out = begin(buffer);
     iwn_out_text(&out, "boot", boot);
     iwn_out_int(&out, "t_us", (int64_t)now_us);
@@ -167,7 +167,7 @@ static void tell_stop(const mqtt_stop_t *stop, iwn_out_t *out) {
     iwn_out_close(out, '}');
 }
 
-size_t mqtt_tell_info(const mqtt_info_t *info, mqtt_buffer_t buffer) {
+size_t mqtt_write_info(const mqtt_info_t *info, mqtt_buffer_t buffer) {
     static const iwc_message_t nothing = {.text = "{}", .length = 2};
     const iwc_message_t *state = (info->state != NULL) ? info->state : &nothing;
     const mqtt_settings_t *settings = info->settings;
@@ -259,8 +259,8 @@ static void tell_device(const mqtt_settings_t *settings, iwn_out_t *out) {
     iwn_out_close(out, '}');
 }
 
-bool mqtt_tell_sensor(const mqtt_settings_t *settings, size_t number, char out_topic[MQTT_TOPIC_SIZE],
-                      mqtt_buffer_t buffer) {
+bool mqtt_write_sensor(const mqtt_settings_t *settings, size_t number, char out_topic[MQTT_TOPIC_SIZE],
+                       mqtt_buffer_t buffer) {
     char text[MQTT_TOPIC_SIZE + 32U];
     if (number >= sizeof sensors / sizeof sensors[0]) {
         return false;

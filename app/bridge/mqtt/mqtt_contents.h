@@ -3,8 +3,8 @@
 /// Pure.
 ///
 /// All functions write into a buffer of the caller and return the length. 0: it did not fit, and must not be used.
-#ifndef MQTT_TELL_H
-#define MQTT_TELL_H
+#ifndef MQTT_CONTENTS_H
+#define MQTT_CONTENTS_H
 
 #include "mqtt_command.h"
 #include "mqtt_settings.h"
@@ -27,23 +27,23 @@ void mqtt_topic(const char *id, const char *what, const char *name, char out[MQT
 const char *mqtt_topic_verb(const char *id, const char *topic);
 
 /// Writes the state of the gateway, with `boot` before its members, so that a command can quote it and its `t_us`.
-size_t mqtt_tell_state(const char *boot, const iwc_message_t *state, mqtt_buffer_t out);
+size_t mqtt_write_state(const char *boot, const iwc_message_t *state, mqtt_buffer_t out);
 
 /// Writes an event: `id` (`boot` and the number), by which a reader recognises duplicates; `boot`; and the wall clock
 /// of its receipt by the bridge.
-size_t mqtt_tell_event(const char *boot, uint64_t number, int64_t wall_us, const iwc_message_t *event,
-                       mqtt_buffer_t out);
+size_t mqtt_write_event(const char *boot, uint64_t number, int64_t wall_us, const iwc_message_t *event,
+                        mqtt_buffer_t out);
 
 /// Writes the reply to `why` as the event `stop`, for a stop that happened while the bridge was away. Frames are
 /// omitted.
-size_t mqtt_tell_missed_stop(const char *boot, uint64_t number, int64_t wall_us, const iwc_message_t *why,
-                             mqtt_buffer_t out);
+size_t mqtt_write_missed_stop(const char *boot, uint64_t number, int64_t wall_us, const iwc_message_t *why,
+                              mqtt_buffer_t out);
 
 /// Writes the answer to a command: the command, `boot`, the current `t_us`, and the reply of the gateway. Without a
 /// reply (NULL) it states whether the command was accepted, and otherwise why not. `order->key` of an `arm`, unless
 /// empty, is added if the reply has no key.
-size_t mqtt_tell_answer(const char *boot, uint64_t now_us, const mqtt_order_t *order, const iwc_message_t *reply,
-                        mqtt_buffer_t out);
+size_t mqtt_write_answer(const char *boot, uint64_t now_us, const mqtt_order_t *order, const iwc_message_t *reply,
+                         mqtt_buffer_t out);
 
 /// Last stop of a machine in `info`, for clients that missed its event.
 typedef struct {
@@ -73,14 +73,14 @@ typedef struct {
     const mqtt_stop_t *stop;
 } mqtt_info_t;
 
-size_t mqtt_tell_info(const mqtt_info_t *info, mqtt_buffer_t out);
+size_t mqtt_write_info(const mqtt_info_t *info, mqtt_buffer_t out);
 
 /// Writes the topic filter of all sensors of this machine.
 void mqtt_sensor_topics(const mqtt_settings_t *settings, char out[MQTT_TOPIC_SIZE]);
 
 /// Writes one sensor for Home Assistant. Returns false if there is no such number. An unknown value stays unknown
 /// there.
-bool mqtt_tell_sensor(const mqtt_settings_t *settings, size_t number, char out_topic[MQTT_TOPIC_SIZE],
-                      mqtt_buffer_t out);
+bool mqtt_write_sensor(const mqtt_settings_t *settings, size_t number, char out_topic[MQTT_TOPIC_SIZE],
+                       mqtt_buffer_t out);
 
 #endif

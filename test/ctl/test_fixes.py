@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The cures that the programs print: every command in them exists, and those that can be carried out here clear the trouble."""
+"""The fixes that the programs print: every command in them exists, and those that can be executed here clear the trouble."""
 
 import glob
 import json
@@ -15,7 +15,7 @@ ROOT = os.path.abspath(os.path.join(os.path.dirname(os.path.abspath(__file__)), 
 from harness import Rig, find_program, read_only
 
 BUILD = os.environ["IWHEEL_BUILD"]
-# Programs of others that cures name: the Debian package, and the words that may follow. None: anything.
+# Programs of others that fixes name: the Debian package, and the words that may follow. None: anything.
 PROGRAMS = {
     "apt-get": ("apt", {"install"}),
     "candump": ("can-utils", None),
@@ -78,7 +78,7 @@ class EveryCommandExists(unittest.TestCase):
         cls.words["doctor"].append("IFACE")
 
     def find(self, pattern, least=1):
-        """(place, match) of everything in the texts that looks so; not finding any is a mistake of this test."""
+        """(place, match) of each match in the texts; no match is a mistake of this test."""
         found = [(f"{path}: {text[:160]}", match) for path, text in self.texts for match in re.finditer(pattern, text)]
         self.assertGreaterEqual(len(found), least, pattern)
         return found
@@ -170,9 +170,9 @@ class EveryCommandExists(unittest.TestCase):
 
 
 class CarriedOut(unittest.TestCase):
-    """Each trouble is made, the cure is taken from what a program prints, done, and the trouble is gone."""
+    """Each test causes a trouble, executes the fix that a program prints, and checks that the trouble is gone."""
 
-    # What only hands can do, by the words of the cure, and how it is done to simulated wheels.
+    # Fixes that need hands, by their words, and the command for the simulated wheels.
     HANDS = {
         "release the e-stop button": "estop release",
         "release the button": "estop release",
@@ -232,16 +232,16 @@ class CarriedOut(unittest.TestCase):
         out = self.ctl("status")[1]
         return " ".join(out[out.index("next") : out.index("last stop")].removeprefix("next").split())
 
-    def use_hands(self, cure):
-        known = [phrase for phrase in self.HANDS if phrase in cure]
+    def use_hands(self, fix):
+        known = [phrase for phrase in self.HANDS if phrase in fix]
         for phrase in known:
             if self.HANDS[phrase]:
                 self.rig.sim.ask(self.HANDS[phrase])
         return known
 
-    def run_commands(self, cure):
-        """Every command of ours in the text, as it stands there; the socket and the control socket are put in."""
-        commands = re.findall(r"(?:iwheelctl|iwheel-sim) [^;,():]+?(?= \w+:|[;,()]|$)", cure)
+    def run_commands(self, fix):
+        """Executes every command of ours in the text, with the socket and the control socket added."""
+        commands = re.findall(r"(?:iwheelctl|iwheel-sim) [^;,():]+?(?= \w+:|[;,()]|$)", fix)
         where = {
             "iwheelctl": f"{program('iwheelctl')} --socket {self.rig.path('gateway.sock')}",
             "iwheel-sim": f"{program('iwheel-sim')} --control {self.rig.path('control')}",
@@ -286,11 +286,11 @@ class CarriedOut(unittest.TestCase):
                 self.leave_latch()
 
     def leave_latch(self):
-        cure = self.next_step()
-        self.assertTrue(self.use_hands(cure), cure)
-        self.wait_for(lambda s: not s["present"] and s["left"]["at_rest"] and s["right"]["at_rest"], cure)
-        time.sleep(0.6)  # What the client had asked for last is forgotten.
-        self.assertEqual(["iwheelctl reset"], self.run_commands(cure), cure)
+        fix = self.next_step()
+        self.assertTrue(self.use_hands(fix), fix)
+        self.wait_for(lambda s: not s["present"] and s["left"]["at_rest"] and s["right"]["at_rest"], fix)
+        time.sleep(0.6)  # The last command of the client is no longer stored.
+        self.assertEqual(["iwheelctl reset"], self.run_commands(fix), fix)
         self.assertEqual("listening", self.status()["state"])
         self.drives()
 
@@ -317,8 +317,8 @@ class CarriedOut(unittest.TestCase):
         self.rig.start_gateway()
         self.drive_into("block both")
         self.wait_for(lambda s: s["cause"] == "wheel_blocked", "blocked")
-        cure = self.next_step()
-        self.assertIn("free the wheel, then arm again", self.ctl("status")[1].replace("\n", " ") + cure)
+        fix = self.next_step()
+        self.assertIn("free the wheel, then arm again", self.ctl("status")[1].replace("\n", " ") + fix)
         self.rig.sim.ask("unblock both")
         self.wait_for(lambda s: s["state"] == "listening", "rest")
         self.drives()
@@ -327,8 +327,8 @@ class CarriedOut(unittest.TestCase):
         self.rig.start_gateway()
         self.drive_into("block left")
         self.wait_for(lambda s: s["cause"] == "pair_diverges", "the pair diverges")
-        cure = self.next_step()
-        self.assertIn("check that the wheel turns freely and drives, then arm again", self.ctl("status")[1].replace("\n", " ") + cure)
+        fix = self.next_step()
+        self.assertIn("check that the wheel turns freely and drives, then arm again", self.ctl("status")[1].replace("\n", " ") + fix)
         self.rig.sim.ask("unblock left")
         self.wait_for(lambda s: s["state"] == "listening", "rest")
         self.drives()
@@ -344,19 +344,19 @@ class CarriedOut(unittest.TestCase):
         self.assertNotIn("bus_state", self.doctor(*button))
         self.rig.sim.ask("babble 333 20000 on")
         time.sleep(0.1)
-        for beside in (False, True):
-            if beside:
+        for next_to_gateway in (False, True):
+            if next_to_gateway:
                 self.rig.start_gateway()
-            cure = self.doctor(*(() if beside else button))["unknown_ids"]["cure"]
+            fix = self.doctor(*(() if next_to_gateway else button))["unknown_ids"]["cure"]
             where = f"{program('iwheelctl')} --socket {self.rig.path('gateway.sock')}"
-            line = re.sub(r"\biwheelctl\b", where, cure.split(": ", 1)[1])
+            line = re.sub(r"\biwheelctl\b", where, fix.split(": ", 1)[1])
             self.assertIn("333", output("sh", "-c", line), line)
         self.rig.sim.ask("normal")
         self.rig.kill_gateway(signal.SIGTERM)
         self.rig.sim.end()
-        cure = self.doctor(*button)["interface"]["cure"]
-        self.assertRegex(cure, r"^start the simulator: iwheel-sim --can unix:\S+$")
-        command = cure.split(": ", 1)[1].split()
+        fix = self.doctor(*button)["interface"]["cure"]
+        self.assertRegex(fix, r"^start the simulator: iwheel-sim --can unix:\S+$")
+        command = fix.split(": ", 1)[1].split()
         with subprocess.Popen(
             [program(command[0]), *command[1:], "--estop", self.rig.path("button"), "--control", self.rig.path("control"), "--quiet"]
         ) as simulator:
@@ -368,10 +368,10 @@ class CarriedOut(unittest.TestCase):
         """Makes the contradiction, does what doctor says, and doctor says it no more."""
         make()
         self.wait_for(lambda s: s["ledger"][item]["state"] == "contradicted", item)
-        cure = self.doctor()["ledger"]["cure"]
-        self.use_hands(cure)
+        fix = self.doctor()["ledger"]["cure"]
+        self.use_hands(fix)
         time.sleep(0.3)
-        if match := re.match(r"correct (\w+)(?: or \w+)? under \[(\w+)\].*then: systemctl restart iwheel-gateway", cure):
+        if match := re.match(r"correct (\w+)(?: or \w+)? under \[(\w+)\].*then: systemctl restart iwheel-gateway", fix):
             key, section = match.groups()
             right = {
                 "setpoint_type": 2,
@@ -386,13 +386,13 @@ class CarriedOut(unittest.TestCase):
             self.rig.write_config()
             self.rig.kill_gateway(signal.SIGTERM)
             self.rig.start_gateway()
-        elif "iwheelctl tare" in cure:
+        elif "iwheelctl tare" in fix:
             time.sleep(2.2)
-            self.run_commands(cure)
+            self.run_commands(fix)
         else:
-            self.run_commands(re.search(r"iwheelctl confirm \S+", cure).group())
+            self.run_commands(re.search(r"iwheelctl confirm \S+", fix).group())
         time.sleep(0.3)
-        self.assertNotIn("ledger", self.doctor(), (item, cure))
+        self.assertNotIn("ledger", self.doctor(), (item, fix))
 
     def test_doctors_cure_of_each_contradiction_settles_it(self):
         wrong = {
@@ -433,7 +433,7 @@ class CarriedOut(unittest.TestCase):
 
 
 class Check(unittest.TestCase):
-    """What `iwheel-gateway --check` says, with the cure carried out."""
+    """Findings of `iwheel-gateway --check` before and after the fix."""
 
     def setUp(self):
         self.rig = Rig(BUILD)
@@ -505,7 +505,7 @@ class Check(unittest.TestCase):
         descriptor = os.open(program("iwheel-gateway"), os.O_RDONLY)
         self.addCleanup(os.close, descriptor)
 
-        def look():
+        def check_record():
             return subprocess.run(
                 [f"/proc/self/fd/{descriptor}", *self.rig.gateway_command("--check")[1:]],
                 text=True,
@@ -517,10 +517,10 @@ class Check(unittest.TestCase):
                 check=False,
             ).stdout
 
-        text = next(line for line in look().splitlines() if "record" in line)
+        text = next(line for line in check_record().splitlines() if "record" in line)
         self.assertIn("Permission denied", text)
         subprocess.run(re.search(r"sudo (chown \d+ \S+)", text).group(1), shell=True, check=True)
-        self.assertIn("ok   record", look())
+        self.assertIn("ok   record", check_record())
 
     def test_record_directory_on_a_read_only_disk_is_a_warning(self):
         if os.geteuid() != 0:
@@ -596,8 +596,8 @@ class Check(unittest.TestCase):
         code, found, done = self.check("--estop", "ESTOP")
         self.assertEqual((69, 1), (code, len(found.get("skip", []))), done.stdout)
         self.assertIn("e-stop ESTOP", found["skip"][0])
-        self.assertTrue(any("left wheel" in text for text in found["ok"]), "the bus is looked at all the same")
-        # What cannot be configured before somebody has seen the wheels changes nothing in that; a mistake does.
+        self.assertTrue(any("left wheel" in text for text in found["ok"]), "the bus is checked anyway")
+        # A key that depends on the wheels does not change the exit code; a mistake does.
         del self.rig.settings["wheels"]["setpoint_type"]
         self.rig.write_config()
         self.assertEqual(69, self.check("--estop", "ESTOP")[0])

@@ -4,8 +4,8 @@
 /// share/northbound.json describes each object.
 ///
 /// All functions write fields into an open object. An unknown value is written as null, never as a number.
-#ifndef IWHEEL_NORTHBOUND_TELL_H
-#define IWHEEL_NORTHBOUND_TELL_H
+#ifndef IWHEEL_NORTHBOUND_CONTENTS_H
+#define IWHEEL_NORTHBOUND_CONTENTS_H
 
 #include "iwheel_northbound/json_out.h"
 #include "iwheel_northbound/request.h"
@@ -76,16 +76,16 @@ typedef struct {
 
 /// Writes the first part of a status, up to the pose: time, state, lease, bus, e-stop and wheels. The caller's objects
 /// follow: ledger, memory and gaps.
-void iwn_tell_machine(const iw_snapshot_t *seen, const iwn_surroundings_t *around, iwn_out_t *json);
+void iwn_write_machine(const iw_snapshot_t *seen, const iwn_surroundings_t *around, iwn_out_t *json);
 
 /// Writes the last part of a status: stop budget, deviation of the pair, counters, clients and warnings.
-void iwn_tell_rest(const iw_snapshot_t *seen, const iwn_surroundings_t *around, iwn_out_t *json);
+void iwn_write_rest(const iw_snapshot_t *seen, const iwn_surroundings_t *around, iwn_out_t *json);
 
 /// Writes the event `force`: time, and forces of both wheels.
-void iwn_tell_force(const iw_snapshot_t *seen, const iwn_surroundings_t *around, iwn_out_t *json);
+void iwn_write_force(const iw_snapshot_t *seen, const iwn_surroundings_t *around, iwn_out_t *json);
 
 /// Writes the last stop, for `why` and the event `stop`. `note->stop.number` 0: there was none.
-void iwn_tell_stop(const iwn_stop_note_t *note, iw_time_us_t now_us, iwn_out_t *json);
+void iwn_write_stop(const iwn_stop_note_t *note, iw_time_us_t now_us, iwn_out_t *json);
 
 /// Sender and receiver of `hello`.
 typedef struct {
@@ -97,40 +97,40 @@ typedef struct {
 } iwn_hello_t;
 
 /// Writes the reply to `hello`, and the event.
-void iwn_tell_hello(const iwn_hello_t *hello, iwn_out_t *json);
+void iwn_write_hello(const iwn_hello_t *hello, iwn_out_t *json);
 
 /// Returns the change of the lease: gained, moved or lost.
-const char *iwn_tell_change(iw_client_t holder, iw_client_t former);
+const char *iwn_write_change(iw_client_t holder, iw_client_t former);
 
 /// Writes the event `lease`, without its time: the present holder and the one before, or IW_CLIENT_NONE.
-void iwn_tell_lease(const iwn_holder_t *holder, iw_client_t former, iwn_out_t *json);
+void iwn_write_lease(const iwn_holder_t *holder, iw_client_t former, iwn_out_t *json);
 
 /// Writes the reply to `drive` and `twist`.
-void iwn_tell_applied(const iw_applied_t *applied, iwn_out_t *json);
+void iwn_write_applied(const iw_applied_t *applied, iwn_out_t *json);
 
 /// Writes the reply to `arm`.
-void iwn_tell_terms(const iw_snapshot_t *seen, const iwn_surroundings_t *around, iwn_out_t *json);
+void iwn_write_terms(const iw_snapshot_t *seen, const iwn_surroundings_t *around, iwn_out_t *json);
 
 /// Writes the reply to `watch`: a bit mask of iwn_topic_t, and the accepted rate.
-void iwn_tell_watched(uint8_t topics, uint32_t rate_hz, bool limited, iwn_out_t *json);
+void iwn_write_watched(uint8_t topics, uint32_t rate_hz, bool limited, iwn_out_t *json);
 
 /// Writes the offset of a wheel after a tare, the statistics of its window, and the offset before.
-void iwn_tell_tare(const iw_force_t *force, const iw_force_quality_t *window, const iw_force_t *before,
-                   iwn_out_t *json);
+void iwn_write_tare(const iw_force_t *force, const iw_force_quality_t *window, const iw_force_t *before,
+                    iwn_out_t *json);
 
 /// Writes the warnings from the start as sentences.
-void iwn_tell_warnings(const iwn_surroundings_t *around, iwn_out_t *json);
+void iwn_write_warnings(const iwn_surroundings_t *around, iwn_out_t *json);
 
 /// Writes the age of an event in ms; null if it never occurred.
-void iwn_tell_age(const char *name, iw_time_us_t now_us, iw_time_us_t then_us, iwn_out_t *json);
+void iwn_write_age(const char *name, iw_time_us_t now_us, iw_time_us_t then_us, iwn_out_t *json);
 
 /// Begins a reply in `size` bytes at `data`, with its `id` and "ok". The caller ends it: iwn_out_close, iwn_out_finish.
-iwn_out_t iwn_tell_reply(char *data, size_t size, const iwn_id_t *id, bool ok);
+iwn_out_t iwn_write_reply(char *data, size_t size, const iwn_id_t *id, bool ok);
 
 /// Begins an event in `size` bytes at `data`.
-iwn_out_t iwn_tell_event(char *data, size_t size, const char *name);
+iwn_out_t iwn_write_event(char *data, size_t size, const char *name);
 
 /// Writes a whole refusal. Returns its length; 0 if it does not fit.
-size_t iwn_tell_refusal(char *data, size_t size, const iwn_id_t *id, const iwn_refusal_t *refusal);
+size_t iwn_write_refusal(char *data, size_t size, const iwn_id_t *id, const iwn_refusal_t *refusal);
 
 #endif
