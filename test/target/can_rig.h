@@ -116,10 +116,10 @@ void rig_reset(void);
 /// Initialises the driver of a device with valid settings; silent or not.
 void rig_init(int device, bool silent);
 
-/// ... and brings it to RUNNING with a quiet bus. Fails the test if it does not get there.
+/// Initialises the driver and brings it to RUNNING with a quiet bus. Fails the test if it does not get there.
 void rig_start(int device);
 
-/// A whole frame with arbitration won and an acknowledgement, if the device has one to send. True if it had; the frame is told.
+/// Plays a whole frame with arbitration won and an acknowledgement. Returns true and writes the frame if the device had one to send.
 bool rig_send_next(int device, model_frame_t *out_frame);
 
 /// Another node sends a data frame with an 11-bit id.

@@ -144,7 +144,7 @@ static void cancel(fdcan_model_t *self, uint32_t bits) {
     }
 }
 
-/// Requests are noticed, and cancellations take effect, while somebody reads.
+/// Requests are noticed, and cancellations take effect, at a read.
 static uint32_t read_txbrp(fdcan_model_t *self) {
     for (uint32_t i = 0; i < FDCAN_MODEL_BUFFERS; i++) {
         const uint32_t bit = 1U << i;
