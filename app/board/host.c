@@ -181,6 +181,7 @@ void brd_host_init(brd_host_t *self, const brd_host_place_t *place, iw_time_us_t
     self->bitrate_hz = place->bitrate_hz;
     self->sample_point_permille = place->sample_point_permille;
     self->boot = place->boot;
+    self->last_fault = place->last_fault;
     self->received_us = now_us;
     self->linked_us = now_us;
     iw_config_t config;

@@ -9,7 +9,7 @@
 ///
 /// The figures are from the data sheets (memory characteristics: 5.3.9 of an F103, 5.3.12 of an F4, 5.3.10 of a G474).
 /// An erase on an F4 takes longer than the period of the watchdog, so it is allowed only before the watchdog is
-/// started.
+/// started. If an option byte starts the watchdog at the reset, the erase extends its period first.
 #ifndef BRD_FLASH_H
 #define BRD_FLASH_H
 

@@ -8,7 +8,7 @@
 #include "flash.h"
 
 #include "board.h"
-#include "cortex_m.h"
+#include "fault.h"
 
 typedef struct {
     volatile uint32_t ACR, PDKEYR, KEYR, OPTKEYR, SR, CR, ECCR, reserved, OPTR;
@@ -48,7 +48,7 @@ void brd_nmi_handler(void);
 void brd_nmi_handler(void) {
     const uint32_t eccr = FLASH->ECCR;
     if ((eccr & ECCD) == 0U) {
-        brd_system_reset();
+        brd_fault_store(NULL);
     }
     FLASH->ECCR = eccr; // Writing 1 clears a flag.
     is_broken = true;

@@ -87,7 +87,7 @@ int main(void) {
     static iw_gateway_t gateway;
     static brd_commander_t commander;
     const bool power_on = brd_clock_was_power_on();
-    const bool restarted = brd_marker_take(power_on);
+    const bool restarted = brd_marker_take();
     brd_commander_open(power_on, restarted);
     brd_watchdog_start();
     brd_pins_init();

@@ -56,7 +56,13 @@ size_t brd_serial_read(char *out, size_t size) {
     return count;
 }
 
+/// A bus error disables the receive channel (13.3.4). It starts again, with the loss of the bytes meanwhile.
 bool brd_serial_had_error(void) {
+    if (!brd_serial_dma_receives()) {
+        taken = 0;
+        brd_serial_dma_start(&BRD_USART2->BRD_USART_RDR, received, sizeof received);
+        return true;
+    }
     return atomic_exchange_explicit(&had_error, false, memory_order_relaxed);
 }
 
@@ -109,16 +115,18 @@ void brd_serial_step(void) {
         return;
     }
     settle();
-    if (lent != NULL && sent == lent_at) {
-        lent_is_sending = true;
-        brd_serial_dma_send(&BRD_USART2->BRD_USART_TDR, lent, lent_bytes);
-        return;
+    const char *from = lent;
+    uint32_t length = lent_bytes;
+    lent_is_sending = lent != NULL && sent == lent_at;
+    if (!lent_is_sending) {
+        const uint32_t until = (lent != NULL) ? lent_at : put;
+        const uint32_t to_end = BRD_SERIAL_SEND_BYTES - sent % BRD_SERIAL_SEND_BYTES;
+        length = sending = (until - sent < to_end) ? until - sent : to_end;
+        from = &waiting[sent % BRD_SERIAL_SEND_BYTES];
     }
-    const uint32_t until = (lent != NULL) ? lent_at : put;
-    const uint32_t to_end = BRD_SERIAL_SEND_BYTES - sent % BRD_SERIAL_SEND_BYTES;
-    sending = (until - sent < to_end) ? until - sent : to_end;
-    if (sending > 0U) {
-        brd_serial_dma_send(&BRD_USART2->BRD_USART_TDR, &waiting[sent % BRD_SERIAL_SEND_BYTES], sending);
+    if (length > 0U) {
+        brd_usart_clear_complete(); // 27.3.13: the DMA does not clear TC, which would still show the last run's end.
+        brd_serial_dma_send(&BRD_USART2->BRD_USART_TDR, from, length);
     }
 }
 

@@ -21,6 +21,7 @@ IMAGE_FILES = (
     "board_clock_f1.c",
     "cortex_m.c",
     "estop.c",
+    "fault.c",
     "frame_ring.c",
     "lamp.c",
     "main.c",

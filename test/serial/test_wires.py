@@ -527,6 +527,18 @@ def explained_anew(t):
     theirs.close()
 
 
+@scenario("a board that restarted after a fault: the relay logs cause and address", 4)
+def fault_of_the_board(t):
+    rig = t.rig()
+    ours, theirs = socket.socketpair()
+    rig.cable = Cable(rig.path("port"), ours)
+    rig.start_relay()
+    link = {"event": "link", "boot": "0123456789abcdef", "version": "0.3.0", "fault_cause": 0x0C000100, "fault_pc": 0x08001234}
+    with talking(theirs, framed(b"0 12 " + json.dumps(link).encode())):
+        t.check(rig.await_relay("fault: cause 0x0C000100 at 0x08001234; report both", 4.0), rig.gateway.text()[-400:])
+    theirs.close()
+
+
 @scenario("ends cleanly by SIGTERM while a client drives", 3)
 def terminated(t):
     rig, client = begin(t)

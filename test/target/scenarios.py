@@ -665,6 +665,18 @@ def reset_after_unproven_hold(rig):
     assert_zero(rig.setpoints(reset_ns))
 
 
+def brown_out(rig):
+    """In motion the board's supply fails for a moment, and that of the wheels does not: zeros first."""
+    start_demo(rig)
+    rig.machine.lose_power(ram_survives=True)
+    failed_ns = rig.machine.now_ns
+    rig.run(3 * SECOND)
+    rig.expect_resets("power")
+    zeros = rig.setpoints(failed_ns + MS)
+    assert zeros and zeros[0].time_ns - failed_ns < 300 * MS, "no zeros first"
+    assert_zero(zeros)
+
+
 def stack_overflow(rig):
     """In motion the stack reaches its end: a fault, not a changed variable; the board restarts with zeros."""
     start_demo(rig)
@@ -679,6 +691,20 @@ def stack_overflow(rig):
     assert reset_ns - overflow_ns < 10 * MS, "the fault was not noticed immediately"
     assert rig.setpoints(reset_ns)[0].time_ns - reset_ns < 300 * MS, "no zeros first"
     assert_zero(rig.setpoints(overflow_ns + MS))
+    reports = [line for line in rig.console() if "the previous run ended with fault 0x0C001000 at 0x00000000; the run before" in line]
+    assert len(reports) == 1, rig.console()
+
+
+def boot_loader(rig):
+    """A boot loader starts the image, with its own vectors in force and interrupts masked: arms as after power-on, and the e-stop works."""
+    rig.machine.start_by_boot_loader()
+    rig.expect_resets("boot loader")
+    arm(rig)
+    pressed_ns = rig.machine.now_ns
+    open_estop(rig)
+    rig.run(1200 * MS)
+    assert rig.setpoints(pressed_ns)[0].time_ns - pressed_ns <= EDGE_TO_ZERO_NS
+    assert_lamp(rig, ESTOP)
 
 
 def loop_stuck(rig):
@@ -815,6 +841,7 @@ SCENARIOS = {
         no_crystal,
         slow_crystal,
         stuck_while_listening,
+        boot_loader,
     ),
     "setpoint": (setpoint_role,),
     "demo": (
@@ -837,6 +864,7 @@ SCENARIOS = {
         reset_again,
         reset_after_the_hold,
         reset_after_unproven_hold,
+        brown_out,
         stack_overflow,
     ),
     "gateway": gateway_scenarios.SCENARIOS,

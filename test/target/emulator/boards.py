@@ -33,7 +33,7 @@ class Board:
     def build(self, machine, seed):
         machine.clocks = self.clocks(machine)
         machine.clocks.crystal_hz = self.crystal_hz or machine.clocks.crystal_hz
-        machine.exti, machine.watchdog, machine.uart = chip.Exti(), chip.Watchdog(self.lsi_hz), self.uart(machine)
+        machine.exti, machine.watchdog, machine.uart = chip.Exti(), chip.Watchdog(machine, self.lsi_hz), self.uart(machine)
         machine.dma, machine.flash = self.dma(machine), self.flash(machine)
         machine.map_flash(machine.flash)
         for name in self.ports:

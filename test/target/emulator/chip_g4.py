@@ -14,6 +14,7 @@ class ClocksG4(chip.Clocks):
     internal_hz, csr_offset, cfgr_offset, pllcfgr_offset, acr_reset = 16_000_000, 0x94, 0x08, 0x0C, 0x40600
     apb1_reset_offset = 0x38
     pll_bits = 0
+    prefetch, prefetch_max_hz, cache_on, cache_reset, acr_without, must_read_acr = 1 << 8, 1 << 40, 1 << 10, 1 << 12, 0x1800, True
 
     def reset(self):
         super().reset()
@@ -33,6 +34,8 @@ class ClocksG4(chip.Clocks):
             return
         if offset == 0x88:  # 7.4.27: FDCANSEL.
             self.expect(not self.chip.can.is_on(), "the clock of the bus was changed while it is in use")
+        if offset == self.cfgr_offset:
+            self.expect(self.acr_is_read or value & 3 != PLL, "the wait states were not read back before the clock rises")
         super().write(offset, value, now_ns)
         if self.cfgr & 3 == PLL:
             self.check_limits()
@@ -61,7 +64,7 @@ class ClocksG4(chip.Clocks):
     def check_limits(self):
         self.expect(self.core_hz <= 150_000_000, f"the core runs at {self.core_hz} Hz")
         self.expect(not self.cfgr >> 4 & 0xF, "the bus of the memories is divided")
-        self.expect(self.can_hz() <= self.apb1_hz(), "the kernel of FDCAN is faster than its bus")
+        self.expect(self.cfgr >> 2 & 3 != PLL or self.can_hz() <= self.apb1_hz(), "the kernel of FDCAN is faster than its bus")
         self.expect((self.acr & 0xF) >= (self.core_hz - 1) // 30_000_000, "too few wait states of the flash")
 
 
@@ -92,9 +95,12 @@ class UartG4(chip.Uart):
     def write(self, offset, value):
         if offset == 0x20:
             self.flags &= ~(value & 0x1F)
+            if value & 0x40:
+                super().write(0, 0)  # As the older version clears TC.
         elif offset == 0:
             super().write(0xC, value & ~0x2001 | (value & 1) << 13)
         elif offset in (0x8, 0xC, 0x28):
+            self.said_sr = True  # A write of TDR alone clears TC.
             super().write({0x8: 0x14, 0xC: 8, 0x28: 4}[offset], value)
         else:
             self.chip.expect(False, f"0x{offset:X} of the USART was written, which is not modelled")
@@ -159,7 +165,7 @@ class FlashG4(chip.Flash):
         self.spend_ns(self.program_ns)
 
     def read(self, offset):
-        return {0: self.chip.clocks.acr, 0x10: self.sr, 0x14: self.cr, 0x18: self.eccr, 0x20: self.two_banks << 22}.get(offset, 0)
+        return self.chip.clocks.read_acr() if offset == 0 else {0x10: self.sr, 0x14: self.cr, 0x18: self.eccr, 0x20: self.two_banks << 22}.get(offset, 0)
 
     def write(self, offset, value):
         if offset == 0x18:
