@@ -36,7 +36,8 @@ static void tell_board(void) {
     brd_console_number(BRD_APB1_HZ / BRD_BIT_PRESCALER / BRD_BIT_QUANTA);
     brd_console_text(" bit/s, sampled at ");
     brd_console_number((1U + BRD_BIT_BS1) * 100U / BRD_BIT_QUANTA);
-    brd_console_text((1000U * (1U + BRD_BIT_BS1) / BRD_BIT_QUANTA % 10U == 5U) ? ".5 %, BTR " : " %, BTR ");
+    brd_console_text((1000U * (1U + BRD_BIT_BS1) / BRD_BIT_QUANTA % 10U == 5U) ? ".5 %, " BRD_BIT_REGISTER " "
+                                                                               : " %, " BRD_BIT_REGISTER " ");
     brd_console_hex(BRD_BIT_BTR);
 }
 

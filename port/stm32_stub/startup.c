@@ -6,9 +6,11 @@ int main(void);
 void brd_reset_handler(void);
 void brd_systick_handler(void);
 void brd_exti0_handler(void);
-void brd_can_transmit_handler(void);
-void brd_can_receive_handler(void);
-void brd_can_error_handler(void);
+// can_bxcan.c defines the first three, can_fdcan.c the last one. An image enables only the interrupts that it has.
+__attribute__((weak)) void brd_can_transmit_handler(void);
+__attribute__((weak)) void brd_can_receive_handler(void);
+__attribute__((weak)) void brd_can_error_handler(void);
+__attribute__((weak)) void brd_can_handler(void);
 // serial.c defines these handlers. An image without serial.c never enables their interrupts.
 __attribute__((weak)) void brd_serial_usart_handler(void);
 __attribute__((weak)) void brd_serial_receive_handler(void);
@@ -25,6 +27,9 @@ __attribute__((naked)) static void fault_handler(void) {
     __asm volatile("mrs r0, msp\n ldr r1, =brd_link_stack_top\n msr msp, r1\n b brd_fault_store");
 }
 
+/// The NMI; flash_g4.c defines it for a chip that reports bad words of its flash by it.
+__attribute__((weak, alias("fault_handler"))) void brd_nmi_handler(void);
+
 typedef union {
     void (*handler)(void);
     uint32_t *stack_top;
@@ -38,7 +43,7 @@ typedef union {
 __attribute__((section(".vectors"), used)) static const brd_vector_t vectors[VECTORS] = {
     [0] = {.stack_top = brd_link_stack_top},
     [1] = {.handler = brd_reset_handler},
-    [2] = {.handler = fault_handler},
+    [2] = {.handler = brd_nmi_handler},
     [3] = {.handler = fault_handler},
     [4] = {.handler = fault_handler},
     [5] = {.handler = fault_handler},
@@ -52,6 +57,7 @@ __attribute__((section(".vectors"), used)) static const brd_vector_t vectors[VEC
     [EXCEPTIONS + BRD_IRQ_SERIAL] = {.handler = brd_serial_usart_handler},
     [EXCEPTIONS + BRD_IRQ_CAN_TRANSMIT] = {.handler = brd_can_transmit_handler},
     [EXCEPTIONS + BRD_IRQ_CAN_RECEIVE] = {.handler = brd_can_receive_handler},
+    [EXCEPTIONS + BRD_IRQ_FDCAN] = {.handler = brd_can_handler},
     [EXCEPTIONS + BRD_IRQ_CAN_ERROR] = {.handler = brd_can_error_handler},
 };
 

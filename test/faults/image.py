@@ -10,15 +10,19 @@ from pathlib import Path
 from table import ROOT, Broken
 
 TARGET, PORT, APPLICATION, SERVER = (ROOT / name for name in ("test/target", "port/stm32_stub", "app/board", "lib/northbound/server/src"))
-DRIVER_FILES = ("bxcan.c", "bxcan_filters.c", "frame_ring.c")
-CPUS = {"f1": "cortex-m3", "f4": "cortex-m4"}
+CPUS = {"f1": "cortex-m3", "f4": "cortex-m4", "g4": "cortex-m4"}
+OF_ANOTHER = {"pins_g4.c": "pins_f4.c", "serial_dma_g4.c": "serial_dma_f1.c"}  # A family has these files in common with another one.
 IMAGE_FILES = (
-    *DRIVER_FILES,
+    "bxcan.c",
+    "bxcan_filters.c",
+    "can_bxcan.c",
+    "can_groups.c",
     "board_clock.c",
     "board_clock_f1.c",
     "cortex_m.c",
     "estop.c",
     "fault.c",
+    "frame_ring.c",
     "lamp.c",
     "main.c",
     "marker.c",
@@ -56,6 +60,13 @@ def must(command):
     done = run(command)
     if done.returncode != 0:
         raise Broken(f"does not build: {done.stderr[-1500:]}")
+
+
+def name_for(family, name):
+    """The file of that family in the place of one of STM32F103."""
+    name = name.replace("_f1.", f"_{family}.")
+    name = OF_ANOTHER.get(name, name)
+    return name.replace("bxcan", "fdcan") if family == "g4" else name
 
 
 def judge(work, applied, folder, image, scenario):
@@ -101,7 +112,7 @@ def judge(work, applied, folder, image, scenario):
     must(
         [
             *flags,
-            *(folder / name.replace("_f1.", f"_{family}.") for name in (*IMAGE_FILES, *talk, f"commander_{source}.c")),
+            *(folder / name_for(family, name) for name in (*IMAGE_FILES, *talk, f"commander_{source}.c")),
             *libraries,
             "--specs=nano.specs",
             "-nostartfiles",

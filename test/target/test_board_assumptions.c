@@ -13,8 +13,8 @@ static uint32_t flash[BRD_FLASH_PAGES][BRD_FLASH_PAGE_WORDS];
 static unsigned operations, cut_after, erasures;
 static gateway_rig_t rig;
 
-const volatile uint32_t *brd_flash_page(unsigned page) {
-    return flash[page];
+uint32_t brd_flash_read(unsigned page, unsigned word) {
+    return flash[page][word];
 }
 
 bool brd_flash_erase(unsigned page) {

@@ -13,9 +13,9 @@ import pytest
 from images import ROOT, STM32
 
 PAGE = ROOT / "docs/user/stm32.md"
-STEPS, STEPS_BOARDS = ROOT / "docs/user/board.md", ("stm32f446", "stm32f103")
+STEPS, STEPS_BOARDS = ROOT / "docs/user/board.md", ("stm32f446", "stm32f103", "stm32g474")
 LAMP = STM32 / "lamp.h"
-PRESETS = {"stm32f103": "arm-m3", "stm32f407": "arm", "stm32f446": "arm"}
+PRESETS = {"stm32f103": "arm-m3", "stm32f407": "arm", "stm32f446": "arm", "stm32g474": "arm"}
 PINS = {
     "e-stop": "BRD_ESTOP",
     "button": "BRD_BUTTON",
@@ -53,7 +53,7 @@ def rows():
         if what == "lamp":
             cells = [f"{cell}, lit by {'a high' if known[board]['lit'] else 'a low'} level" for cell, board in zip(cells, PRESETS, strict=True)]
         if what.startswith("CAN"):
-            cells = [f"{cell}; {pin(other[what])} with `IWHEEL_CAN_PINS=PA11`" for cell in cells]
+            cells = [cell if cell == pin(other[what]) else f"{cell}; {pin(other[what])} with `IWHEEL_CAN_PINS=PA11`" for cell in cells]
         yield f"| {what} | " + " | ".join(cells) + " |"
     yield "| core, APB1 | " + " | ".join(f"{known[board]['core']}, {known[board]['apb1']} MHz" for board in PRESETS) + " |"
 
@@ -76,7 +76,7 @@ def commands():
 def steps():
     """Beginnings of the rows of board.md, and its commands."""
     known = {board: facts(board) for board in STEPS_BOARDS}
-    usb = {"stm32f446": " (in the USB plug)", "stm32f103": ""}
+    usb = dict.fromkeys(STEPS_BOARDS, " (in the USB plug)") | {"stm32f103": ""}
     for what in ("CAN receive", "CAN transmit", "e-stop", "serial, from the chip", "serial, to the chip"):
         yield f"| {what} | " + " | ".join(pin(known[board][what]) + (usb[board] if "serial" in what else "") for board in STEPS_BOARDS) + " | "
     yield from (f"| {lamp} | {state} | " for lamp, state in re.findall(r"^/// \| (\S.*?) +\| (\S.*?) +\|$", LAMP.read_text(), re.MULTILINE)[1:])

@@ -60,6 +60,10 @@ class Clocks:
         self.cfgr = self.cfgr & ~0xC | switched << 2
         self.core_hz = (self.internal_hz, self.crystal_hz, self.pll_hz() if switched == 2 else 0)[switched]
 
+    def runs_from_crystal(self):
+        """The core runs on the PLL, and the PLL on the crystal."""
+        return bool(self.cfgr >> 2 & 3) and self.pll_from_hse()
+
     def read(self, offset, now_ns):
         if not self.settled:
             self.update(now_ns)
@@ -446,10 +450,13 @@ class DmaChannel:
     def is_on(self):
         return bool(self.control() & 1)
 
+    def data_register(self):
+        return 0x40004404
+
     def begin(self):
         self.left = self.length = self.registers["count"]
         self.begun_ns = self.chip.now_ns
-        self.chip.expect(self.registers["peripheral"] == 0x40004404, "the DMA does not serve the USART's data register")
+        self.chip.expect(self.registers["peripheral"] == self.data_register(), "the DMA does not serve the USART's data register")
         self.chip.expect(
             self.registers["memory"] >= 0x20000000 and self.registers["memory"] + self.length <= 0x20000000 + self.chip.board.ram_size,
             "the DMA reaches where no RAM is",

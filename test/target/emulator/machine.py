@@ -92,7 +92,8 @@ class Machine:
         self.after_exit, self.pc = Registers(cpu, SP, *FRAME), Registers(cpu, PC)
         self.stack, self.result = Registers(cpu, SP), Registers(cpu, *FRAME[:2])
         self.error, self.callbacks, self.until = None, [], NOWHERE
-        self.map_registers(0x40000000, 0x30000, self.board.read, self.board.write)
+        for base, size in self.board.spaces:
+            self.map_registers(base, size, self.board.read, self.board.write)
         self.map_registers(0xE000E000, 0x1000, self.read_system, self.write_system)
         self.clock = BlockClock(stop=ctypes.cast(uclib.uc_emu_stop, ctypes.c_void_p).value)
         for kind, function in ((UC_HOOK_BLOCK, self.library.block_hook), (UC_HOOK_INTR, self.library.trap_hook)):
