@@ -5,7 +5,7 @@
 /// 62.5 % is 5/8, so a bit must have a multiple of 8 quanta, and a bit of bxCAN has at most 25 (bxCAN 7.7: 1 + 16 + 8).
 /// 24 quanta would need 14 before and 9 after the sample point, one more than bxCAN allows. 8 and 16 remain, so APB1
 /// must be a multiple of 8 MHz; another clock does not compile. A bit has 16 quanta if the clock allows it, because
-/// finer quanta make the resynchronisation finer. A bit of FDCAN has up to 385 quanta (RM0440 44.4.6), so that its
+/// finer quanta make the resynchronisation finer. A bit of FDCAN has up to 385 quanta (RM0440 44.4), so that its
 /// prescaler is 1: at 80 MHz a bit has 80 quanta, and the sample point is after 50 of them.
 #ifndef BRD_BIT_RATE_H
 #define BRD_BIT_RATE_H
@@ -34,7 +34,7 @@
 /// Resynchronisation jump width: as wide as possible, to tolerate different oscillators on the wheels and on the board.
 #define BRD_BIT_SJW ((BRD_BIT_BS2 < BRD_BIT_SJW_MAX) ? BRD_BIT_BS2 : BRD_BIT_SJW_MAX)
 
-/// Value of BTR (bxCAN 9.2) or NBTP (RM0440 44.4.6): each field contains its number minus one.
+/// Value of BTR (bxCAN 9.2) or NBTP (RM0440 44.4): each field contains its number minus one.
 #ifdef BRD_FDCAN_ADDRESS
 #define BRD_BIT_BTR                                                                                                    \
     (((BRD_BIT_SJW - 1U) << 25) | ((BRD_BIT_PRESCALER - 1U) << 16) | ((BRD_BIT_BS1 - 1U) << 8) | (BRD_BIT_BS2 - 1U))

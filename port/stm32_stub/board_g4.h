@@ -31,7 +31,7 @@
 #define BRD_APB1_HZ 80000000U ///< Also the kernel clock of FDCAN and USART2.
 #endif
 
-#define BRD_FLASH_WAIT_STATES 2U ///< For 61 to 90 MHz in voltage range 1 (RM0440 3.3.3).
+#define BRD_FLASH_WAIT_STATES 2U ///< For 61 to 90 MHz in voltage range 1 (RM0440 3.3).
 
 /// Highest frequency of the watchdog's oscillator; nominal 32 kHz.
 #define BRD_LSI_MAX_HZ 34000U

@@ -9,7 +9,7 @@
 // A poll takes at least 8 cycles, and the longest frame with an error at its end takes 200 us. This number of polls
 // takes at least 250 us and at most 1.5 ms.
 #define CANCEL_POLLS (BRD_CORE_HZ / 8U / 4000U)
-#define FDCAN_RESET  (1U << 25) // In APB1RSTR1 of the RCC: RM0440 7.4.12.
+#define FDCAN_RESET  (1U << 25) // In APB1RSTR1 of the RCC: RM0440 7.4.
 
 void brd_can_handler(void);
 

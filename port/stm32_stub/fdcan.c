@@ -10,7 +10,7 @@
 #define ALL        ((1U << BRD_FDCAN_BUFFERS) - 1U)
 #define READY      (BRD_CCCR_INIT | BRD_CCCR_CCE)
 
-/// Writes CCCR (RM0440 44.4.5). These bits stay zero: DAR (the controller repeats an unacknowledged frame until it is
+/// Writes CCCR (RM0440 44.4). These bits stay zero: DAR (the controller repeats an unacknowledged frame until it is
 /// cancelled), FDOE (classic frames only), PXHD (an FD frame is not destroyed), TXP, ASM, CSR and TEST.
 static void write_cccr(const brd_fdcan_t *self, uint32_t request) {
     brd_register_write(&self->config.registers->CCCR, (self->config.silent ? BRD_CCCR_MON : 0U) | request);
@@ -38,7 +38,7 @@ static void configure(brd_fdcan_t *self) {
     brd_register_write(&registers->ILE, BRD_ILE_0);
 }
 
-/// A read clears PXE (RM0440 44.4.12), so every read of PSR counts it.
+/// A read clears PXE (RM0440 44.4), so every read of PSR counts it.
 static uint32_t read_psr(brd_fdcan_t *self) {
     const uint32_t psr = brd_register_read(&self->config.registers->PSR);
     if ((psr & BRD_PSR_PXE) != 0U) {
@@ -76,7 +76,7 @@ static void unmask_transmit(const brd_fdcan_t *self) {
 }
 
 /// Returns the buffers with a transmission that is not complete. A request moves from TXBAR to TXBRP when the
-/// controller has noticed it (RM0440 44.4.28), so TXBAR must be read first.
+/// controller has noticed it (RM0440 44.4), so TXBAR must be read first.
 static uint32_t read_pending(const brd_fdcan_t *self) {
     const uint32_t requested = brd_register_read(&self->config.registers->TXBAR);
     return (requested | brd_register_read(&self->config.registers->TXBRP)) & ALL;
@@ -124,7 +124,7 @@ static bool withdraw_id(brd_fdcan_t *self, uint32_t id, brd_fdcan_outgoing_t *he
     return done;
 }
 
-/// Writes a free buffer without a request. The search begins at the put index (RM0440 44.4.26) and continues in the
+/// Writes a free buffer without a request. The search begins at the put index (RM0440 44.4) and continues in the
 /// direction in which a request moves it. Returns the buffer, or BRD_FDCAN_BUFFERS if none is free.
 static uint32_t load_free_buffer(brd_fdcan_t *self, const iw_can_frame_t *frame, brd_fdcan_outgoing_t *heir) {
     const uint32_t put = (brd_register_read(&self->config.registers->TXFQS) >> BRD_TXFQS_PUT_SHIFT) & 3U;
@@ -159,7 +159,7 @@ static uint32_t place(brd_fdcan_t *self, const iw_can_frame_t *frame) {
     return buffer;
 }
 
-/// Requests all these buffers with one write (RM0440 44.4.28). With the interrupt masked the handler sees either
+/// Requests all these buffers with one write (RM0440 44.4). With the interrupt masked the handler sees either
 /// neither the request nor its mark, or both.
 static void request(brd_fdcan_t *self, uint32_t buffers) {
     mask_transmit(self);

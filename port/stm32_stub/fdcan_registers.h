@@ -30,14 +30,14 @@ typedef struct {
     brd_register_t CKDIV; ///< Of the clock of all controllers; 0 after reset: not divided.
 } brd_fdcan_registers_t;
 
-static_assert(offsetof(brd_fdcan_registers_t, CCCR) == 0x18, "44.4.5");
-static_assert(offsetof(brd_fdcan_registers_t, NBTP) == 0x1C, "44.4.6");
-static_assert(offsetof(brd_fdcan_registers_t, ECR) == 0x40, "44.4.11");
-static_assert(offsetof(brd_fdcan_registers_t, IR) == 0x50, "44.4.14");
-static_assert(offsetof(brd_fdcan_registers_t, RXGFC) == 0x80, "44.4.18");
-static_assert(offsetof(brd_fdcan_registers_t, RXF0S) == 0x90, "44.4.21");
-static_assert(offsetof(brd_fdcan_registers_t, TXBC) == 0xC0, "44.4.25");
-static_assert(offsetof(brd_fdcan_registers_t, CKDIV) == 0x100, "44.4.36");
+static_assert(offsetof(brd_fdcan_registers_t, CCCR) == 0x18, "CCCR is at 0x18");
+static_assert(offsetof(brd_fdcan_registers_t, NBTP) == 0x1C, "NBTP is at 0x1C");
+static_assert(offsetof(brd_fdcan_registers_t, ECR) == 0x40, "ECR is at 0x40");
+static_assert(offsetof(brd_fdcan_registers_t, IR) == 0x50, "IR is at 0x50");
+static_assert(offsetof(brd_fdcan_registers_t, RXGFC) == 0x80, "RXGFC is at 0x80");
+static_assert(offsetof(brd_fdcan_registers_t, RXF0S) == 0x90, "RXF0S is at 0x90");
+static_assert(offsetof(brd_fdcan_registers_t, TXBC) == 0xC0, "TXBC is at 0xC0");
+static_assert(offsetof(brd_fdcan_registers_t, CKDIV) == 0x100, "CKDIV is at 0x100");
 
 #define BRD_FDCAN_BUFFERS 3U
 #define BRD_FDCAN_DEPTH   3U ///< Of a receive FIFO.

@@ -43,7 +43,7 @@ static volatile bool is_broken; // The NMI sets it.
 
 void brd_nmi_handler(void);
 
-/// A word whose write was interrupted can have two wrong bits, and reading it raises the NMI (3.3.8). Without this
+/// A word whose write was interrupted can have two wrong bits, and reading it raises the NMI (3.3). Without this
 /// handler each start would end in a reset while it searches the store. Every other NMI is a failure of the crystal.
 void brd_nmi_handler(void) {
     const uint32_t eccr = FLASH->ECCR;
@@ -79,7 +79,7 @@ static bool begin(uint32_t what) {
     return (FLASH->CR & LOCK) == 0U;
 }
 
-/// Clears the data cache, which still contains the words from before the write (3.3.4).
+/// Clears the data cache, which still contains the words from before the write (3.3).
 static void empty_cache(void) {
     const uint32_t acr = FLASH->ACR;
     FLASH->ACR = acr & ~DCEN;
@@ -108,7 +108,7 @@ bool brd_flash_erase(unsigned page) {
     return end();
 }
 
-/// 3.3.7: the write begins with the second half.
+/// 3.3: the write begins with the second half.
 bool brd_flash_write(unsigned page, unsigned word, uint32_t value) {
     volatile uint32_t *const at = words_of(page, word);
     if (!begin(PG)) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Section numbers refer to RM0008: 7.3.6 clock enable, 13.4 DMA. Table 78: USART2 uses channels 6 (receive) and 7
 // (transmit) of DMA1. The DMA of an STM32G4 has the same registers (RM0440 12.6). Its requests come from a multiplexer
-// (RM0440 13.6), of which input 26 and 27 are USART2 (table 91).
+// (RM0440 13), of which input 26 and 27 are USART2.
 #include "serial.h"
 
 #include "board.h"
@@ -34,7 +34,7 @@ typedef struct {
 /// Connects USART2 with both channels, where the chip has a multiplexer for it.
 static void connect(void) {
 #ifdef BRD_DMAMUX_ADDRESS
-    (void)AHBENR; // A clock needs two cycles after its register is written (RM0440 7.2.17).
+    (void)AHBENR; // A clock needs two cycles after its register is written (RM0440 7.2).
     volatile uint32_t *const multiplexer = (volatile uint32_t *)BRD_DMAMUX_ADDRESS; // Counts the channels from 0.
     multiplexer[5] = 26U;
     multiplexer[6] = 27U;

@@ -11,7 +11,7 @@ static bool is_exact(const iw_bit_timing_t *timing) {
 }
 
 #ifdef BRD_FDCAN_ADDRESS
-#define LIMITS   ((iw_bit_timing_limits_t){512U, 2U, 256U, 2U, 128U}) // RM0440 44.4.6: NBTP.
+#define LIMITS   ((iw_bit_timing_limits_t){512U, 2U, 256U, 2U, 128U}) // RM0440 44.4: NBTP.
 #define JUMP     (((BRD_BIT_BTR >> 25) & 0x7FU) + 1U)
 #define JUMP_MAX 128U
 

@@ -4,11 +4,11 @@
 from . import chip
 from .chip import MS, US
 
-INTERNAL, CRYSTAL, PLL = 1, 2, 3  # SW and SWS of RCC_CFGR (7.4.3).
+INTERNAL, CRYSTAL, PLL = 1, 2, 3  # SW and SWS of RCC_CFGR (7.4).
 
 
 class ClocksG4(chip.Clocks):
-    """7.4. Range 1 without boost (6.1.5)."""
+    """7.4. Range 1 without boost (6.1)."""
 
     crystal_hz = 24_000_000
     internal_hz, csr_offset, cfgr_offset, pllcfgr_offset, acr_reset = 16_000_000, 0x94, 0x08, 0x0C, 0x40600
@@ -32,7 +32,7 @@ class ClocksG4(chip.Clocks):
         if offset == self.csr_offset:
             self.flags = 0 if value >> 23 & 1 else self.flags
             return
-        if offset == 0x88:  # 7.4.27: FDCANSEL.
+        if offset == 0x88:  # 7.4: FDCANSEL.
             self.expect(not self.chip.can.is_on(), "the clock of the bus was changed while it is in use")
         if offset == self.cfgr_offset:
             self.expect(self.acr_is_read or value & 3 != PLL, "the wait states were not read back before the clock rises")
@@ -107,7 +107,7 @@ class UartG4(chip.Uart):
 
 
 class ChannelG4(chip.ChannelF1):
-    """12.6, and the multiplexer before it (13.6, table 91): input 26 is received by USART2, 27 sent."""
+    """12.6, and the multiplexer before it (13): input 26 is received by USART2, 27 sent."""
 
     def data_register(self):
         return 0x40004428 if self.control() & self.FROM_MEMORY else 0x40004424
@@ -176,7 +176,7 @@ class FlashG4(chip.Flash):
             self.chip.expect(False, f"0x{offset:X} of the flash was written, which is not modelled")
 
     def poll(self):
-        """3.3.6: PER, STRT, and the number of the page in its bank."""
+        """3.3: PER, STRT, and the number of the page in its bank."""
         if self.cr & 0x10002 != 0x10002:
             return
         page = self.cr >> 3 & 0x7F
