@@ -61,6 +61,7 @@ class Keys(unittest.TestCase):
         end = time.monotonic() + 5
         while not holds(self.status()):
             self.assertLess(time.monotonic(), end, what)
+            time.sleep(0.01)
 
     def test_each_key_plants_its_fault_tells_so_and_takes_it_back(self):
         operator = self.start()
