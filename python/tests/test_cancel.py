@@ -12,11 +12,13 @@ import tempfile
 import time
 import unittest
 
+import pytest
 from rig import ROOT, RigCase, now_us
 from stand_in import StandIn
 
 from iwheel import AsyncGateway, Refused
 
+pytestmark = pytest.mark.native("a race")
 COUNT = int(os.environ.get("IWHEEL_CANCELLATIONS", "2400"))
 END_S = 0.1
 """A cancelled task ends within this time, including its stop if the wheels are already at standstill."""

@@ -11,6 +11,7 @@ import threading
 import time
 import unittest
 
+import pytest
 from rig import BUILD, ROOT, RigCase
 
 import iwheel
@@ -181,6 +182,7 @@ class Story(unittest.TestCase):
             self.witness.event(event)
         client.events.clear()
 
+    @pytest.mark.pace(1)
     def test_gateway_messages_match_the_description_both_ways(self):
         self.rig.sim.ask("mute both")
         self.rig.sim.ask("raw left 32767")

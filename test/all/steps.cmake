@@ -109,7 +109,8 @@ test(real ros2.typed check+full foreign default "${B}/app/bridge/ros2/iwheel-ros
 test(real kilted ci foreign default "${B}/app/bridge/ros2/iwheel-ros2 py:cyclonedds py:rosbags py:pytest" 60 env IWHEEL_ROS=build/ros-kilted ${PYTEST} test/ros2/test_typed.py --build ${B} --jobs 2 -k "graph_fastrtps or services_fastrtps or publishers or drive")
 test(idle mqtt.hours check+full safety default ${B}/app/bridge/mqtt/iwheel-mqtt 10 ${B}/test/mqtt/mqtt_hours)
 test(real mqtt check+full realtime default "${B}/app/bridge/mqtt/iwheel-mqtt py:paho.mqtt py:pytest mosquitto openssl" 94 ${PYTEST} test/mqtt --build ${B} --jobs 3)
-test(real serial check+full realtime default py:pytest 40 ${PYTEST} test/serial/test_wires.py --build ${B} --jobs 4)
+test(idle serial check+full scenario "default;kernel.build" py:pytest 60 ${PYTEST} test/serial/test_wires.py --build ${B} --virtual --jobs ${JOBS})
+test(real serial.realtime check+full realtime default py:pytest 15 ${PYTEST} test/serial/test_wires.py --build ${B} --jobs 4 -m native)
 test(real serial.image check+full target default "py:pytest py:unicorn arm-none-eabi-gcc" 40 ${PYTEST} test/serial/test_image.py --build ${B})
 test(real web check+full realtime default "${B}/app/bridge/web/iwheel-web py:pytest" 69 ${PYTEST} test/web --build ${B})
 test(idle cross.packages ci packaging default "" 78 test/cross/run --build)
@@ -135,9 +136,12 @@ test(idle python.description check lint "" "" 1 python3 test/northbound/test_des
 # pip installs from a copy: setuptools writes into the source folder.
 test(idle python.install check packaging "" py:pip 8 sh -c "rm -rf build/python && mkdir -p build/python && cp -r python/src python/pyproject.toml python/README.md build/python && .venv/bin/pip install --quiet --disable-pip-version-check --no-deps --no-index --no-build-isolation --target build/python/site ./build/python && cd / && PYTHONPATH=${ROOT}/build/python/site ${ROOT}/.venv/bin/python -c 'import iwheel'")
 test(idle python.types check lint "" py:mypy 10 sh -c "cd python && ../.venv/bin/mypy")
-test(real python check realtime default py:pytest 60 ${PYTEST} python/tests --build ${B} --jobs 3)
-test(real ctl check realtime default py:pytest 150 ${PYTEST} test/ctl --build ${B} --jobs 4 --ignore test/ctl/test_bringup.py)
-test(idle ctl.bringup check scenario "default;kernel.build" py:pytest 40 ${PYTEST} test/ctl/test_bringup.py --build ${B} --virtual --jobs ${JOBS})
+test(idle python check scenario "default;kernel.build" py:pytest 80 ${PYTEST} python/tests --build ${B} --virtual --jobs ${JOBS})
+test(real python.realtime check realtime default py:pytest 25 ${PYTEST} python/tests --build ${B} --jobs 3 -m native)
+set(files test/ctl/test_recordings.py test/ctl/test_learn_table.py) # They only compute.
+test(idle ctl check scenario "default;kernel.build" py:pytest 160 ${PYTEST} test/ctl --build ${B} --virtual --jobs ${JOBS} --ignore-glob=*/test_recordings.py --ignore-glob=*/test_learn_table.py)
+test(idle ctl.files check unit default py:pytest 20 ${PYTEST} ${files} --build ${B} --jobs ${JOBS})
+test(real ctl.realtime check realtime default py:pytest 60 ${PYTEST} test/ctl --build ${B} --jobs 4 -m native)
 test(real captures check realtime default "" 22 python3 test/ctl/captures --build ${B} --check)
 # The demo exits with 0 even if it could not judge the timing; here that is no success.
 test(real demo check realtime "" "" 40 python3 test/support/verdict.py --run demo bash -o pipefail -c "./demo </dev/null 2>&1 | tee build/check/demo.said && ! grep -q 'Timing was not judged' build/check/demo.said")

@@ -11,7 +11,9 @@ import tempfile
 import time
 import unittest
 
+import pytest
 
+pytestmark = pytest.mark.native("a signal between two system calls")
 ROOT = os.path.abspath(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", ".."))
 BUILD = os.environ["IWHEEL_BUILD"]
 

@@ -226,7 +226,7 @@ def board_reset(t):
     end_well(t, rig, client)
 
 
-@scenario("100 000 corrupted, cut, doubled and late lines move nothing", 14)
+@scenario("100 000 corrupted, cut, doubled and late lines move nothing", 14, native="a flood")
 def bad_lines(t):
     send_bad_lines(t, 100_000, 500)
 
@@ -357,7 +357,7 @@ def delayed(t):
     end_well(t, rig, await_service(t, rig))
 
 
-@scenario("commands faster than the line: each gets a reply, the newest is sent, none waits", 5)
+@scenario("commands faster than the line: each gets a reply, the newest is sent, none waits", 5, native="a flood")
 def too_fast(t):
     rig, client = begin(t)
     first_us = now_us()
@@ -375,7 +375,7 @@ def too_fast(t):
     end_well(t, rig, client)
 
 
-@scenario("a flood of requests of one client costs another neither lease nor stop", 6)
+@scenario("a flood of requests of one client costs another neither lease nor stop", 6, native="a flood")
 def flood(t):
     rig, client = begin(t)
     flooder = rig.client()
