@@ -13,6 +13,10 @@
 
 #include "iwheel/gateway.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /// Increases if an earlier client would misunderstand the protocol.
 #define IWN_API_VERSION 1
 /// Telemetry other than speed is unknown after this time: five periods of status and pose.
@@ -133,4 +137,7 @@ iwn_out_t iwn_tell_event(char *data, size_t size, const char *name);
 /// Writes a whole refusal. Returns its length; 0 if it does not fit.
 size_t iwn_tell_refusal(char *data, size_t size, const iwn_id_t *id, const iwn_refusal_t *refusal);
 
+#ifdef __cplusplus
+}
+#endif
 #endif
