@@ -208,13 +208,6 @@ TEST(test_reason_is_that_of_the_last_failed_call) {
     TEST_ASSERT_EQUAL_STRING(iwc_words(IWC_INVALID), iwc_reason(gateway));
 }
 
-TEST(test_reason_without_connection_is_not_empty) {
-    iwc_t *fresh = iwc_new();
-    TEST_ASSERT_EQUAL_STRING(iwc_words(IWC_CLOSED), iwc_reason(fresh));
-    iwc_free(fresh);
-    TEST_ASSERT_GREATER_THAN(3, strlen(iwc_reason(NULL)));
-}
-
 TEST(test_ask_refusal_without_id_ends_the_pending_request) {
     send_text("{\"id\":null,\"ok\":false,\"error\":\"bad_json\",\"message\":\"\"}\n");
     TEST_ASSERT_EQUAL(IWC_REFUSED, iwc_reset(gateway, SOON));
