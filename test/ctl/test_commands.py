@@ -16,7 +16,7 @@ from harness import find_program
 
 BUILD = os.environ["IWHEEL_BUILD"]
 # Those that talk with a person.
-WITHOUT_JSON = {"top", "bringup", "help", "web"}
+WITHOUT_JSON = {"top", "bringup", "help", "web", "export"}
 
 
 def run(*words, program="iwheelctl", path=None, **more):

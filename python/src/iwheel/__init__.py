@@ -47,6 +47,7 @@ from ._protocol import (
     Watched,
     WheelStatus,
 )
+from ._recording import RecordedEvent, Recording, RecordingError, Sample, WheelSample, read_recording
 from ._types import Applied, DisconnectedEvent, Event, OnStatus, ReconnectedEvent, Terms, Whole
 from ._version import __version__
 from ._wire import default_socket
@@ -84,10 +85,14 @@ __all__ = [
     "Piece",
     "ProtocolError",
     "ReconnectedEvent",
+    "RecordedEvent",
+    "Recording",
     "RecordingEntry",
+    "RecordingError",
     "Recordings",
     "Refused",
     "RollingEvent",
+    "Sample",
     "StateEvent",
     "Status",
     "Stop",
@@ -96,8 +101,10 @@ __all__ = [
     "Tared",
     "Terms",
     "Watched",
+    "WheelSample",
     "WheelStatus",
     "Whole",
     "__version__",
     "default_socket",
+    "read_recording",
 ]

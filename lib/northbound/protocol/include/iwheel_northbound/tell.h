@@ -137,6 +137,13 @@ iwn_out_t iwn_tell_event(char *data, size_t size, const char *name);
 /// Writes a whole refusal. Returns its length; 0 if it does not fit.
 size_t iwn_tell_refusal(char *data, size_t size, const iwn_id_t *id, const iwn_refusal_t *refusal);
 
+/// Returns true if speeds in mm/s are valid: they depend on the radius, and on the gear ratio if the wheels report the
+/// rpm of the rotor. Inline: the writer of a snapshot is its main user.
+static inline bool iwn_is_speed_known(const iw_snapshot_t *seen) {
+    return seen->assumed[IW_ASSUMPTION_WHEEL_RADIUS].state != IW_CONTRADICTED &&
+           !(seen->config->rpm_of_rotor && seen->assumed[IW_ASSUMPTION_GEAR_RATIO].state == IW_CONTRADICTED);
+}
+
 #ifdef __cplusplus
 }
 #endif
