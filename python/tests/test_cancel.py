@@ -12,7 +12,7 @@ import tempfile
 import time
 import unittest
 
-from rig import ROOT, RigCase, now_us
+from rig import SOURCES, RigCase, now_us
 from stand_in import StandIn
 
 from iwheel import AsyncGateway, Refused
@@ -354,7 +354,7 @@ class CancelledWithRig(RigCase):
     def run_program(self, script, *end):
         child = subprocess.Popen(
             [sys.executable, "-c", "import asyncio, os, sys, threading, time\nfrom iwheel import *\n" + script, self.socket],
-            env={**os.environ, "PYTHONPATH": os.pathsep.join([os.path.join(ROOT, "python", "src"), os.environ.get("PYTHONPATH", "")])},
+            env={**os.environ, "PYTHONPATH": os.pathsep.join([SOURCES, os.environ.get("PYTHONPATH", "")])},
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,

@@ -11,7 +11,9 @@ import threading
 import time
 import unittest
 
-from rig import BUILD, ROOT, RigCase
+from rig import BUILD, ROOT, RigCase, require_gateway
+
+require_gateway()
 
 import iwheel
 from client import Closed
