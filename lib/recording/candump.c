@@ -153,6 +153,7 @@ static const char *parse_time(cursor_t *cursor, candump_t *frame) {
 
 static const char *parse_interface(cursor_t *cursor, candump_t *frame) {
     size_t length = 0;
+    bool ascii = true;
     (void)skip_blanks(cursor);
     for (; cursor->at < cursor->end && !is_blank(*cursor->at); cursor->at++) {
         const unsigned char c = (unsigned char)*cursor->at;
@@ -161,8 +162,9 @@ static const char *parse_interface(cursor_t *cursor, candump_t *frame) {
         }
         frame->interface[length] = *cursor->at;
         length++;
+        ascii = ascii && c < 0x80U;
     }
-    if (!iwn_plain_text(frame->interface)) {
+    if (!ascii && !iwn_plain_text(frame->interface)) {
         return "the interface name holds characters that move a terminal; is the line damaged?";
     }
     return (length == 0U || !skip_blanks(cursor)) ? "ends behind the time or the interface; is the line cut?" : NULL;

@@ -18,11 +18,11 @@ COMPILERS = ("gcc", "clang")
 ARM_CPUS = ("cortex-m4", "cortex-m0plus")
 # Instructions for a line.
 READ_LIMITS = {
-    "libiwheel-client, an event `state`": 120000,
-    "the same, and its fields": 180000,
-    "iwheelctl decode": 8500,
-    "iwheelctl decode --csv": 8500,
-    "iwheelctl --json decode": 6000,
+    "libiwheel-client, an event `state`": 67000,
+    "the same, and its fields": 109000,
+    "iwheelctl decode": 4300,
+    "iwheelctl decode --csv": 4600,
+    "iwheelctl --json decode": 4700,
 }
 PROFILE_FROM = 40  # instructions of a function in a step
 

@@ -303,6 +303,23 @@ class Decode(unittest.TestCase):
         self.assertIn("shorter", rows[1]["note"])
         self.assertIn("11-bit", rows[2]["note"])
 
+    def test_decode_odd_frames_stay_in_their_columns(self):
+        text = lines("20001004#00", "12345678#0102 T", "123#R8 R", "100##1" + "AB" * 12)
+        self.assertEqual(
+            [
+                "    0.000000  4100 (0x1004)         error     1 byte: 00 (the controller's report of an error on the bus, not a frame)",
+                "    0.001000  305419896 (0x12345678) T       unknown   2 bytes: 01 02",
+                "    0.002000   291 (0x123)         unknown   remote, 8 bytes",
+                "    0.003000   256 (0x100)         ignored   CAN FD, 12 bytes:" + " AB" * 12,
+            ],
+            [row.split(" (the wheels", maxsplit=1)[0] for row in self.decode(text)[1].splitlines()[1:]],
+        )
+        self.assertEqual(["0x1004", "0x12345678", "0x123", "0x100"], [row["id_hex"] for row in self.rows(text)])
+
+    def test_decode_time_before_the_first_frame_is_negative(self):
+        out = self.decode("(2.5) can0 123#\n(2.250001) can0 123#\n(1.0) can0 123#\n")[1]
+        self.assertEqual(["0.000000", "-0.249999", "-1.500000"], [row.split()[0] for row in out.splitlines()[1:]])
+
     def test_bad_lines_are_reported_with_fix_and_lose_nothing_else(self):
         code, out, err = self.decode(lines("100#00000000") + "garbage\r\n" + lines("100#00000001").replace("\n", "\r\n") + "(1760000001.0) can0 100#0000")
         self.assertEqual(65, code)

@@ -44,10 +44,10 @@ static bool jansson_takes(const char *text, size_t length) {
 }
 
 static void compare(const char *text, size_t length) {
-    if (iwc_json_is_object(text, length, false) != jansson_takes(text, length)) {
+    if (iwc_json_is_object(text, length) != jansson_takes(text, length)) {
         char why[200];
         (void)snprintf(why, sizeof why, "%.*s", (length < 190) ? (int)length : 190, text);
-        TEST_ASSERT_EQUAL_MESSAGE(jansson_takes(text, length), iwc_json_is_object(text, length, false), why);
+        TEST_ASSERT_EQUAL_MESSAGE(jansson_takes(text, length), iwc_json_is_object(text, length), why);
     }
 }
 
@@ -66,10 +66,43 @@ TEST(test_json_every_changed_byte_agrees_with_jansson) {
             memcpy(text, STATUS, sizeof(STATUS));
             text[at] = bytes[i];
             compare(text, sizeof(STATUS) - 1U);
-            accepted += iwc_json_is_object(text, sizeof(STATUS) - 1U, false) ? 1U : 0U;
+            accepted += iwc_json_is_object(text, sizeof(STATUS) - 1U) ? 1U : 0U;
         }
     }
     TEST_ASSERT_GREATER_THAN(1000, accepted); // Both parsers also accept valid texts.
+}
+
+static bool is_trusted(const char *text, iwc_stored_t *stored) {
+    return iwc_json_is_trusted_object(text, strlen(text), stored);
+}
+
+TEST(test_json_ledger_is_stored_until_it_changes) {
+    static iwc_stored_t stored;
+    stored.length = 0;
+    TEST_ASSERT_TRUE(is_trusted("{\"event\":\"bus\",\"state\":\"active\"}", &stored));
+    TEST_ASSERT_EQUAL_size_t(0, stored.length);
+    TEST_ASSERT_TRUE(is_trusted("{\"t_us\":1,\"ledger\":{\"a\":[1]},\"clients\":1}", &stored));
+    TEST_ASSERT_EQUAL_STRING_LEN("{\"a\":[1]}", stored.value, stored.length);
+    TEST_ASSERT_TRUE(is_trusted("{\"t_us\":22,\"ledger\":{\"a\":[1]},\"clients\":1}", &stored));
+    TEST_ASSERT_FALSE(is_trusted("{\"t_us\":3,\"ledger\":{\"a\":[1]},\"clients\":}", &stored));
+    TEST_ASSERT_FALSE(is_trusted("{\"t_us\":3,\"ledger\":{\"a\":[2},\"clients\":1}", &stored));
+    TEST_ASSERT_EQUAL_size_t(strlen("{\"a\":[1]}"), stored.length);
+    TEST_ASSERT_TRUE(is_trusted("{\"t_us\":4,\"ledger\":{\"a\":[23]},\"clients\":1}", &stored));
+    TEST_ASSERT_EQUAL_STRING_LEN("{\"a\":[23]}", stored.value, stored.length);
+    TEST_ASSERT_TRUE(is_trusted("{\"t_us\":5,\"ledger\":null}", &stored));
+    TEST_ASSERT_EQUAL_STRING_LEN("{\"a\":[23]}", stored.value, stored.length);
+}
+
+TEST(test_json_ledger_beyond_its_buffer_is_not_stored) {
+    static iwc_stored_t stored;
+    static char text[IWC_STORED_MAX + 64U];
+    for (size_t more = 0; more < 2U; more++) {
+        stored.length = 0;
+        const int blanks = (int)(IWC_STORED_MAX - strlen("{}") + more);
+        const int length = snprintf(text, sizeof text, "{\"ledger\":{%*s}}", blanks, "");
+        TEST_ASSERT_TRUE(iwc_json_is_trusted_object(text, (size_t)length, &stored));
+        TEST_ASSERT_EQUAL_size_t((more == 0U) ? IWC_STORED_MAX : 0U, stored.length);
+    }
 }
 
 TEST(test_json_hard_cases_agree_with_jansson) {
@@ -132,7 +165,7 @@ TEST(test_json_nul_byte_is_refused_at_every_position) {
     for (size_t at = 0; at < sizeof(STATUS); at++) {
         memcpy(text, STATUS, sizeof(STATUS));
         text[at] = '\0';
-        TEST_ASSERT_FALSE(iwc_json_is_object(text, sizeof(STATUS) - ((at + 1U < sizeof(STATUS)) ? 1U : 0U), false));
+        TEST_ASSERT_FALSE(iwc_json_is_object(text, sizeof(STATUS) - ((at + 1U < sizeof(STATUS)) ? 1U : 0U)));
     }
 }
 
@@ -143,7 +176,7 @@ TEST(test_json_depth_is_bounded) {
         memset(text + 5, '[', depth);
         memset(text + 5 + depth, ']', depth);
         text[5 + 2U * depth] = '}';
-        TEST_ASSERT_EQUAL(depth < IWN_DEPTH_MAX, iwc_json_is_object(text, 6U + 2U * depth, false));
+        TEST_ASSERT_EQUAL(depth < IWN_DEPTH_MAX, iwc_json_is_object(text, 6U + 2U * depth));
     }
     TEST_ASSERT_EQUAL_CHAR('[', *inner);
 }
@@ -155,7 +188,7 @@ TEST(test_json_duplicate_of_the_first_of_many_keys_is_refused) {
         used += (size_t)snprintf(text + used, sizeof text - used, ",\"%x\":0", i + 0x10U);
     }
     used += (size_t)snprintf(text + used, sizeof text - used, ",\"a\":2}");
-    TEST_ASSERT_FALSE(iwc_json_is_object(text, used, false)); // The first keys are stored until the end.
+    TEST_ASSERT_FALSE(iwc_json_is_object(text, used)); // The first keys are stored until the end.
 }
 
 TEST(test_field_integers_must_be_whole_and_fit_64_bits) {
@@ -173,6 +206,33 @@ TEST(test_field_integers_must_be_whole_and_fit_64_bits) {
         TEST_ASSERT_FALSE_MESSAGE(iwc_integer(&message, unknown[i]).known, unknown[i]);
         TEST_ASSERT_EQUAL_INT64(0, iwc_integer(&message, unknown[i]).value);
     }
+}
+
+TEST(test_field_cursor_finds_fields_in_any_order) {
+    const iwc_message_t message = message_of("{\"a\":1,\"o\":{\"b\":2,\"c\":\"x\",\"b.d\":3},\"e\":true,\"a\":9}");
+    iwc_cursor_t cursor = {&message, NULL};
+    char text[8];
+    const iwc_message_t object = iwc_field(&cursor, "o");
+    TEST_ASSERT_EQUAL_INT64(2, iwc_integer(&object, "b").value);
+    TEST_ASSERT_TRUE(iwc_is(&object, "c", "x"));
+    const iwc_message_t last = iwc_field(&cursor, "e");
+    TEST_ASSERT_EQUAL_INT64(1, iwc_truth(&last, "").value);
+    const iwc_message_t behind = iwc_field(&cursor, "a");
+    TEST_ASSERT_EQUAL_INT64(9, iwc_integer(&behind, "").value);
+    const iwc_message_t none = iwc_field(&cursor, "x");
+    TEST_ASSERT_NULL(none.text);
+    TEST_ASSERT_FALSE(iwc_integer(&none, "").known || iwc_truth(&none, "").known || iwc_integer(&none, "a").known);
+    TEST_ASSERT_FALSE(iwc_text(&none, "", text, sizeof text) || iwc_is(&none, "", "") || iwc_is(&none, "a", "x"));
+    const iwc_message_t first = iwc_field(&cursor, "a");
+    TEST_ASSERT_EQUAL_INT64(1, iwc_integer(&first, "").value);
+    iwc_cursor_t inside = {&object, NULL};
+    const iwc_message_t name = iwc_field(&inside, "c");
+    TEST_ASSERT_TRUE(iwc_text(&name, "", text, sizeof text));
+    TEST_ASSERT_EQUAL_STRING("x", text);
+    const iwc_message_t dotted = iwc_field(&inside, "b.d");
+    TEST_ASSERT_EQUAL_INT64(3, iwc_integer(&dotted, "").value);
+    inside = (iwc_cursor_t){&name, NULL};
+    TEST_ASSERT_NULL(iwc_field(&inside, "c").text);
 }
 
 TEST(test_field_text_is_escaped_and_cut_between_characters) {

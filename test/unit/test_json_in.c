@@ -166,6 +166,42 @@ TEST(test_json_without_work_may_have_a_name_twice) {
     }
 }
 
+static bool check_again(const char *text, size_t length, iwn_repeated_t *repeated) {
+    iwn_text_t fault = iwn_text_begin(why, sizeof why);
+    char *const copy = malloc(length + 1U); // A sanitizer finds a read beyond it.
+    memcpy(copy, text, length);
+    const bool good = iwn_json_check_again(copy, length, repeated, &root, &fault);
+    free(copy);
+    return good;
+}
+
+/// The stored value is no JSON, so only a text in which it is not checked is accepted.
+TEST(test_json_repeated_value_of_the_root_is_not_checked) {
+    static const char *const accepted[] = {"{\"a\":{#}}", "{\"b\":[1],\"a\":{#},\"c\":{}}", "{\"a\":{#} , \"b\":{#}}"};
+    static const char *const refused_texts[] = {"{\"b\":{\"a\":{#}}}", "[{#}]",         "{\"a\":[{#}]}", "{\"a\":{#}",
+                                                "{\"a\":{#",           "{\"a\":{#}1}",  "{\"a\":{!}}",   "{{#}:1}",
+                                                "{\"a\":{#},}",        "{\"a\":{#}}\"x"};
+    iwn_repeated_t repeated = {.value = "{#}", .length = 3U};
+    for (size_t i = 0; i < sizeof accepted / sizeof accepted[0]; i++) {
+        TEST_ASSERT_TRUE_MESSAGE(check_again(accepted[i], strlen(accepted[i]), &repeated), accepted[i]);
+        TEST_ASSERT_TRUE(repeated.met);
+    }
+    for (size_t i = 0; i < sizeof refused_texts / sizeof refused_texts[0]; i++) {
+        TEST_ASSERT_FALSE_MESSAGE(check_again(refused_texts[i], strlen(refused_texts[i]), &repeated), refused_texts[i]);
+    }
+    for (size_t length = 0; length < strlen(accepted[0]); length++) { // The bytes behind the end would match.
+        iwn_text_t fault = iwn_text_begin(why, sizeof why);
+        TEST_ASSERT_FALSE(iwn_json_check_again(accepted[0], length, &repeated, &root, &fault));
+        TEST_ASSERT_EQUAL(length == strlen("{\"a\":{#}"), repeated.met);
+    }
+    TEST_ASSERT_TRUE(check_again("{\"a\":1}", 7U, &repeated));
+    TEST_ASSERT_FALSE(repeated.met);
+    repeated.length = 0;
+    TEST_ASSERT_TRUE(check_again("{\"a\":{}}", 8U, &repeated));
+    TEST_ASSERT_FALSE(repeated.met);
+    TEST_ASSERT_FALSE(check_again(accepted[0], strlen(accepted[0]), &repeated));
+}
+
 TEST(test_json_delete_is_allowed_in_a_text) {
     TEST_ASSERT_TRUE(check("[\"\x7f\x7f plain behind it \x7f\"]", 24U));
     TEST_ASSERT_TRUE(check("{\"\x7f\":1}", 7U));

@@ -110,13 +110,21 @@ static void read_condition(const iwc_message_t *state, char *out, size_t size) {
     char cause[32];
     char estop[16];
     char bus[16];
-    (void)iwc_text(state, "state", machine, sizeof machine);
-    (void)iwc_text(state, "cause", cause, sizeof cause);
-    (void)iwc_text(state, "estop.state", estop, sizeof estop);
-    (void)iwc_text(state, "bus.state", bus, sizeof bus);
-    const iwc_value_t holder = iwc_integer(state, "lease.holder");
-    (void)snprintf(out, size, "%s %s %s %s %lld %d%d", machine, cause, estop, bus, (long long)holder.value,
-                   iwc_truth(state, "left.heard").value == 1, iwc_truth(state, "right.heard").value == 1);
+    iwc_cursor_t cursor = {state, NULL}; // In the order of the gateway.
+    const iwc_message_t machine_field = iwc_field(&cursor, "state");
+    const iwc_message_t cause_field = iwc_field(&cursor, "cause");
+    const iwc_message_t lease = iwc_field(&cursor, "lease");
+    const iwc_message_t bus_field = iwc_field(&cursor, "bus");
+    const iwc_message_t estop_field = iwc_field(&cursor, "estop");
+    const iwc_message_t left = iwc_field(&cursor, "left");
+    const iwc_message_t right = iwc_field(&cursor, "right");
+    (void)iwc_text(&machine_field, "", machine, sizeof machine);
+    (void)iwc_text(&cause_field, "", cause, sizeof cause);
+    (void)iwc_text(&estop_field, "state", estop, sizeof estop);
+    (void)iwc_text(&bus_field, "state", bus, sizeof bus);
+    (void)snprintf(out, size, "%s %s %s %s %lld %d%d", machine, cause, estop, bus,
+                   (long long)iwc_integer(&lease, "holder").value, iwc_truth(&left, "heard").value == 1,
+                   iwc_truth(&right, "heard").value == 1);
 }
 
 /// Returns the rate at which the gateway must send its state.

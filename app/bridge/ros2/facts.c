@@ -13,17 +13,24 @@ bool ros_facts_read(const iwc_t *gateway, const iwc_message_t *message, ros_mach
     if (!iwc_state(gateway, message, &out_machine->now)) {
         return false;
     }
-    out_machine->wall_us = iwc_integer(message, "wall_us").value;
-    out_machine->lease_ms = iwc_integer(message, "lease.lease_ms").value;
-    (void)iwc_text(message, "estop.state", out_machine->estop, sizeof out_machine->estop);
-    (void)iwc_text(message, "estop.pressed_at", out_machine->pressed_at, sizeof out_machine->pressed_at);
-    out_machine->estop_tried = iwc_integer(message, "estop.tried_wall_us").known;
-    out_machine->estop_simulated = iwc_truth(message, "estop.simulated").value != 0;
-    out_machine->holding = iwc_truth(message, "holding").value != 0;
-    out_machine->rolling = iwc_truth(message, "rolling").value != 0;
-    (void)iwc_text(message, "bus.state", out_machine->bus, sizeof out_machine->bus);
-    (void)iwc_text(message, "bus.timing", out_machine->timing, sizeof out_machine->timing);
-    (void)iwc_text(message, "lease.name", out_machine->holder, sizeof out_machine->holder);
+    iwc_cursor_t cursor = {message, NULL}; // In the order of the gateway.
+    const iwc_message_t wall_us = iwc_field(&cursor, "wall_us");
+    const iwc_message_t lease = iwc_field(&cursor, "lease");
+    const iwc_message_t bus = iwc_field(&cursor, "bus");
+    const iwc_message_t estop = iwc_field(&cursor, "estop");
+    const iwc_message_t holding = iwc_field(&cursor, "holding");
+    const iwc_message_t rolling = iwc_field(&cursor, "rolling");
+    out_machine->wall_us = iwc_integer(&wall_us, "").value;
+    (void)iwc_text(&lease, "name", out_machine->holder, sizeof out_machine->holder);
+    out_machine->lease_ms = iwc_integer(&lease, "lease_ms").value;
+    (void)iwc_text(&bus, "state", out_machine->bus, sizeof out_machine->bus);
+    (void)iwc_text(&bus, "timing", out_machine->timing, sizeof out_machine->timing);
+    (void)iwc_text(&estop, "state", out_machine->estop, sizeof out_machine->estop);
+    (void)iwc_text(&estop, "pressed_at", out_machine->pressed_at, sizeof out_machine->pressed_at);
+    out_machine->estop_simulated = iwc_truth(&estop, "simulated").value != 0;
+    out_machine->estop_tried = iwc_integer(&estop, "tried_wall_us").known;
+    out_machine->holding = iwc_truth(&holding, "").value != 0;
+    out_machine->rolling = iwc_truth(&rolling, "").value != 0;
     return true;
 }
 

@@ -12,29 +12,29 @@
 
 typedef struct {
     const char *column; ///< Name for CSV, in the unit of the bus.
-    const char *label;  ///< Name for text.
+    const char *label;  ///< Name for text, with a space.
     const char *unit;
     unsigned digits; ///< Decimals in text.
 } field_words_t;
 
 static const field_words_t words[FIELDS] = {
-    [FIELD_SETPOINT_TYPE] = {"setpoint_type", "type", "", 0},
-    [FIELD_SETPOINT_SPEED] = {"setpoint_speed_mm_s", "speed", "mm/s", 0},
-    [FIELD_SETPOINT_CURRENT] = {"setpoint_current_mA", "current", "mA", 0},
+    [FIELD_SETPOINT_TYPE] = {"setpoint_type", "type ", "", 0},
+    [FIELD_SETPOINT_SPEED] = {"setpoint_speed_mm_s", "speed ", "mm/s", 0},
+    [FIELD_SETPOINT_CURRENT] = {"setpoint_current_mA", "current ", "mA", 0},
     [FIELD_SPEED] = {"speed_rpm", "", "rpm", 0},
-    [FIELD_ACCELERATION] = {"acceleration_raw", "acceleration", "(unit unknown)", 0},
-    [FIELD_BATTERY] = {"battery_dV", "battery", "V", 1},
-    [FIELD_TEMPERATURE] = {"temperature_degC", "temperature", "degC", 0},
-    [FIELD_ODOMETRY] = {"odometry_ticks", "odometry", "ticks", 0},
-    [FIELD_CPU] = {"cpu_percent", "CPU", "%", 0},
-    [FIELD_POSE_X] = {"pose_x_mm", "x", "mm", 0},
-    [FIELD_POSE_Y] = {"pose_y_mm", "y", "mm", 0},
-    [FIELD_POSE_Z] = {"pose_z_mm", "z", "mm", 0},
-    [FIELD_POSE_PSI] = {"pose_psi_mrad", "psi", "mrad", 0},
-    [FIELD_FORCE_RAW] = {"force_raw", "raw", "", 0},
-    [FIELD_FORCE] = {"force_with_offset_mN", "force with offset", "N", 3},
-    [FIELD_FORCE_DEBUG] = {"force_debug_raw", "debug", "", 0},
-    [FIELD_OFFSET] = {"force_offset_dN", "force offset", "N", 1},
+    [FIELD_ACCELERATION] = {"acceleration_raw", "acceleration ", "(unit unknown)", 0},
+    [FIELD_BATTERY] = {"battery_dV", "battery ", "V", 1},
+    [FIELD_TEMPERATURE] = {"temperature_degC", "temperature ", "degC", 0},
+    [FIELD_ODOMETRY] = {"odometry_ticks", "odometry ", "ticks", 0},
+    [FIELD_CPU] = {"cpu_percent", "CPU ", "%", 0},
+    [FIELD_POSE_X] = {"pose_x_mm", "x ", "mm", 0},
+    [FIELD_POSE_Y] = {"pose_y_mm", "y ", "mm", 0},
+    [FIELD_POSE_Z] = {"pose_z_mm", "z ", "mm", 0},
+    [FIELD_POSE_PSI] = {"pose_psi_mrad", "psi ", "mrad", 0},
+    [FIELD_FORCE_RAW] = {"force_raw", "raw ", "", 0},
+    [FIELD_FORCE] = {"force_with_offset_mN", "force with offset ", "N", 3},
+    [FIELD_FORCE_DEBUG] = {"force_debug_raw", "debug ", "", 0},
+    [FIELD_OFFSET] = {"force_offset_dN", "force offset ", "N", 1},
 };
 
 static void put(decoded_t *out, field_t field, int32_t value) {
@@ -133,9 +133,9 @@ void field_add_all(const decoded_t *decoded, iwn_text_t *line) {
     for (unsigned field = 0; field < FIELDS; field++) {
         if ((decoded->present & (1U << field)) != 0U) {
             const field_words_t *word = &words[field];
-            char number[TEXT_CELL];
-            text_number(decoded->value[field], word->digits, word->unit, number);
-            IWN_TEXT_JOIN(line, gap, word->label, (word->label[0] == '\0') ? "" : " ", number);
+            iwn_text_add(line, gap);
+            iwn_text_add(line, word->label);
+            text_add_number(decoded->value[field], word->digits, word->unit, line);
             gap = ", ";
         }
     }

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "frame.h"
 
-#include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -17,24 +16,60 @@ void frame_add_bytes(const candump_t *frame, const char *gap, iwn_text_t *line) 
     }
 }
 
+void frame_add_id(const candump_t *frame, iwn_text_t *line) {
+    unsigned digits = frame->extended ? 8U : 3U;
+    while (frame->id >> 4U * digits != 0U && digits < 8U) { // An error report may have more than a standard id.
+        digits++;
+    }
+    iwn_text_add(line, "0x");
+    iwn_text_hex(line, frame->id, digits);
+}
+
+/// Appends the number of bytes, and the bytes.
+static void add_length(const candump_t *frame, iwn_text_t *line) {
+    IWN_TEXT_JOIN(line, frame->remote ? "remote, " : "", frame->fd ? "CAN FD, " : "");
+    iwn_text_int(line, frame->length);
+    iwn_text_add(line, (frame->length == 1U) ? " byte" : " bytes");
+    if (frame->length > 0U && !frame->remote) {
+        iwn_text_add(line, ": ");
+        frame_add_bytes(frame, " ", line);
+    }
+}
+
+/// Appends a text with spaces before it (`right`) or behind it.
+static void add_cell(const char *text, size_t columns, bool right, iwn_text_t *line) {
+    static const char blanks[] = "            ";
+    const size_t length = strlen(text);
+    const size_t gap = (length < columns) ? columns - length : 0U;
+    iwn_text_span(line, blanks, right ? gap : 0U);
+    iwn_text_span(line, text, length);
+    iwn_text_span(line, blanks, right ? 0U : gap);
+}
+
 void frame_print(const char *time_text, const candump_t *frame, const decoded_t *decoded) {
     char text[FRAME_LINE_SIZE];
-    iwn_text_t values = iwn_text_begin(text, sizeof text);
+    char number[IWN_DIGITS_MAX + 1U];
+    iwn_text_t line = iwn_text_begin(text, sizeof text);
+    iwn_text_t id = iwn_text_begin(number, sizeof number);
+    iwn_text_int(&id, frame->id);
+    add_cell(time_text, 12U, true, &line);
+    iwn_text_add(&line, "  ");
+    add_cell(number, 4U, true, &line);
+    iwn_text_add(&line, " (");
+    frame_add_id(frame, &line);
+    iwn_text_add(&line, (frame->mark == CANDUMP_SENT) ? ") T " : ")   ");
+    add_cell(decoded->wheel, 6U, false, &line);
+    add_cell(decoded->message, 10U, false, &line);
     if (decoded->present != 0U) {
-        field_add_all(decoded, &values);
+        field_add_all(decoded, &line);
     } else {
-        IWN_TEXT_JOIN(&values, frame->remote ? "remote, " : "", frame->fd ? "CAN FD, " : "");
-        iwn_text_int(&values, frame->length);
-        IWN_TEXT_JOIN(&values, (frame->length == 1U) ? " byte" : " bytes",
-                      (frame->length > 0U && !frame->remote) ? ": " : "");
-        frame_add_bytes(frame, " ", &values);
+        add_length(frame, &line);
     }
     if (decoded->note[0] != '\0') {
-        IWN_TEXT_JOIN(&values, " (", decoded->note, ")");
+        IWN_TEXT_JOIN(&line, " (", decoded->note, ")");
     }
-    (void)printf("%12s  %4" PRIu32 " (0x%0*" PRIX32 ")%-2s %-5s %-8s  %s\n", time_text, frame->id,
-                 frame->extended ? 8 : 3, frame->id, (frame->mark == CANDUMP_SENT) ? " T" : "", decoded->wheel,
-                 decoded->message, text);
+    iwn_text_span(&line, "\n", 1U);
+    (void)fwrite(text, 1, line.length, stdout);
 }
 
 /// Reads hexadecimal text into bytes. Returns their number.

@@ -17,6 +17,9 @@ const char *frame_direction(const candump_t *frame);
 /// Appends the data in hexadecimal, with `gap` between the bytes.
 void frame_add_bytes(const candump_t *frame, const char *gap, iwn_text_t *line);
 
+/// Appends `0x` and the id in hexadecimal: 3 digits, 8 if it is extended.
+void frame_add_id(const candump_t *frame, iwn_text_t *line);
+
 /// Prints time (12 columns, any form), id, direction and values; the bytes if the frame has no values.
 void frame_print(const char *time_text, const candump_t *frame, const decoded_t *decoded);
 

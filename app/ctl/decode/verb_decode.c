@@ -64,25 +64,49 @@ static void write_csv_header(void) {
     (void)puts(",note");
 }
 
-static void write_csv(const candump_t *frame, const decoded_t *decoded) {
-    char text[FRAME_LINE_SIZE];
-    char name[CANDUMP_INTERFACE_SIZE];
-    iwn_text_t values = iwn_text_begin(text, sizeof text);
-    for (size_t i = 0; i < sizeof name; i++) { // A comma or quote would begin another column.
-        const char c = frame->interface[i];
-        name[i] = (c == ',' || c == '"' || c == '\'') ? '_' : c;
-    }
-    frame_add_bytes(frame, "", &values);
-    IWN_TEXT_JOIN(&values, ",", decoded->wheel, ",", decoded->message, ",");
+/// A comma or quote would begin another column.
+static char csv_character(char c) {
+    return (c == ',' || c == '"' || c == '\'') ? '_' : c;
+}
+
+static const char commas[] = ",,,,,,,,,,,,,,,,,";
+IW_STATIC_ASSERT(sizeof commas == FIELDS + 1U, a_comma_for_each_field);
+
+static void write_csv_fields(const decoded_t *decoded, iwn_text_t *line) {
+    unsigned written = 0;
     for (unsigned field = 0; field < FIELDS; field++) {
         if ((decoded->present & (1U << field)) != 0U) {
-            iwn_text_int(&values, decoded->value[field]);
+            iwn_text_span(line, commas, field + 1U - written);
+            iwn_text_int(line, decoded->value[field]);
+            written = field + 1U;
         }
-        iwn_text_span(&values, ",", 1U);
     }
-    (void)printf("%" PRId64 ".%06" PRId64 ",%s,%s,%" PRIu32 ",0x%0*" PRIX32 ",%u,%s\"%s\"\n", frame->time_us / 1000000,
-                 frame->time_us % 1000000, name, frame_direction(frame), frame->id, frame->extended ? 8 : 3, frame->id,
-                 frame->length, text, decoded->note);
+    iwn_text_span(line, commas, FIELDS - written);
+}
+
+static void write_csv(const candump_t *frame, const decoded_t *decoded) {
+    char text[FRAME_LINE_SIZE];
+    char time_text[TEXT_CELL];
+    char name[CANDUMP_INTERFACE_SIZE];
+    iwn_text_t line = iwn_text_begin(text, sizeof text);
+    size_t length = 0;
+    for (; frame->interface[length] != '\0'; length++) {
+        name[length] = csv_character(frame->interface[length]);
+    }
+    name[length] = '\0';
+    text_number(frame->time_us, 6U, "", time_text);
+    IWN_TEXT_JOIN(&line, time_text, ",", name, ",", frame_direction(frame), ",");
+    iwn_text_int(&line, frame->id);
+    iwn_text_add(&line, ",");
+    frame_add_id(frame, &line);
+    iwn_text_add(&line, ",");
+    iwn_text_int(&line, frame->length);
+    iwn_text_add(&line, ",");
+    frame_add_bytes(frame, "", &line);
+    IWN_TEXT_JOIN(&line, ",", decoded->wheel, ",", decoded->message);
+    write_csv_fields(decoded, &line);
+    IWN_TEXT_JOIN(&line, ",\"", decoded->note, "\"\n");
+    (void)fwrite(text, 1, line.length, stdout);
 }
 
 /// Returns the text, or NULL (written as null) if it is empty.

@@ -86,21 +86,29 @@ void text_decimal(const json_t *value, unsigned digits, const char *unit, char o
     }
 }
 
+void text_add_number(long long number, unsigned digits, const char *unit, iwn_text_t *text) {
+    char decimals[1U + TEXT_DECIMALS_MAX] = ".";
+    unsigned long long rest = (number < 0) ? 0U - (unsigned long long)number : (unsigned long long)number;
+    for (unsigned i = digits; i > 0U; i--) {
+        decimals[i] = (char)('0' + rest % 10U);
+        rest /= 10U;
+    }
+    if (number < 0 && rest == 0U) {
+        iwn_text_span(text, "-", 1U);
+    }
+    iwn_text_int(text, (int64_t)((number < 0) ? 0U - rest : rest));
+    if (digits > 0U) {
+        iwn_text_span(text, decimals, 1U + digits);
+    }
+    if (unit[0] != '\0') {
+        iwn_text_span(text, " ", 1U);
+        iwn_text_add(text, unit);
+    }
+}
+
 void text_number(long long number, unsigned digits, const char *unit, char out[TEXT_CELL]) {
-    long long scale = 1;
-    for (unsigned i = 0; i < digits; i++) {
-        scale *= 10;
-    }
     iwn_text_t text = iwn_text_begin(out, TEXT_CELL);
-    iwn_text_add(&text, (number < 0 && number / scale == 0) ? "-" : "");
-    iwn_text_int(&text, number / scale);
-    iwn_text_add(&text, (digits > 0U) ? "." : "");
-    while (scale > 1) {
-        number %= scale;
-        scale /= 10;
-        iwn_text_int(&text, llabs(number / scale));
-    }
-    IWN_TEXT_JOIN(&text, (unit[0] != '\0') ? " " : "", unit);
+    text_add_number(number, digits, unit, &text);
 }
 
 void text_age(const json_t *age_ms, char out[TEXT_CELL]) {

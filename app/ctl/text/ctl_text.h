@@ -4,6 +4,7 @@
 #define CTL_TEXT_H
 
 #include "iwheel/config.h"
+#include "iwheel_northbound/text.h"
 
 #include <jansson.h>
 #include <stdarg.h>
@@ -45,7 +46,12 @@ void text_integer(const json_t *value, const char *unit, char out[TEXT_CELL]);
 /// an integer.
 void text_decimal(const json_t *value, unsigned digits, const char *unit, char out[TEXT_CELL]);
 
-/// Writes a known number as text_decimal does.
+/// Most decimals of a number.
+#define TEXT_DECIMALS_MAX 6U
+
+/// Appends a known number as text_decimal writes it, with at most TEXT_DECIMALS_MAX decimals.
+void text_add_number(long long number, unsigned digits, const char *unit, iwn_text_t *text);
+/// Writes a known number as text_add_number does.
 void text_number(long long number, unsigned digits, const char *unit, char out[TEXT_CELL]);
 
 /// Writes an age in ms in a suitable unit: "12 ms", "3.4 s", "5 min", "7 h", "2 days"; "--" if it is not an age.

@@ -58,10 +58,11 @@ static bool is_trusted(iwc_span_t line) {
            memcmp(line.at, hello, sizeof hello - 1U) != 0;
 }
 
-/// Returns false if the line is not a message. Does not search for equal names in a trusted line.
+/// Returns false if the line is not a message.
 static bool admit_line(iwc_t *self, iwc_span_t line) {
     const bool trusted = is_trusted(line);
-    if (line.length > IWC_LINE_MAX || !iwc_json_is_object(line.at, line.length, trusted)) {
+    if (line.length > IWC_LINE_MAX || !(trusted ? iwc_json_is_trusted_object(line.at, line.length, &self->stored)
+                                                : iwc_json_is_object(line.at, line.length))) {
         return false;
     }
     const bool is_event = trusted || iwc_json_find(line, "event").at != NULL;

@@ -47,7 +47,7 @@ static int64_t *place_to_drive(iwc_t *self) {
 /// request, or too long.
 static size_t number_it(char *line, const char *request, int64_t id) {
     const size_t length = strlen(request);
-    if (!iwc_json_is_object(request, length, false) || request[0] != '{' || memchr(request, '\n', length) != NULL) {
+    if (!iwc_json_is_object(request, length) || request[0] != '{' || memchr(request, '\n', length) != NULL) {
         return 0;
     }
     const int n = snprintf(line, IWC_REQUEST_MAX + 2U, "{\"id\":%lld,%s\n", (long long)id, request + 1);

@@ -40,6 +40,7 @@ struct iwc {
     iwc_result_t failed; ///< Result of the last call that failed; IWC_OK: none has failed on this connection.
     char error[64];
     char reason[1024];
+    iwc_stored_t stored;
     char line[IWC_LINE_MAX + 1U]; ///< The last message that the caller received, terminated.
     char in[IWC_IN_SIZE];
 };

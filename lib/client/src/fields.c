@@ -39,8 +39,7 @@ static size_t unit_length(const char *at) {
     return (byte < 0x80U) ? 1 : (byte < 0xE0U) ? 2 : (byte < 0xF0U) ? 3 : 4;
 }
 
-bool iwc_text(const iwc_message_t *message, const char *path, char *out, size_t size) {
-    const iwc_span_t value = field(message, path);
+static bool copy_text(iwc_span_t value, char *out, size_t size) {
     size_t used = 0;
     if (size == 0) {
         return false;
@@ -64,6 +63,10 @@ bool iwc_text(const iwc_message_t *message, const char *path, char *out, size_t 
     return true;
 }
 
+bool iwc_text(const iwc_message_t *message, const char *path, char *out, size_t size) {
+    return copy_text(field(message, path), out, size);
+}
+
 bool iwc_is(const iwc_message_t *message, const char *path, const char *text) {
     return iwc_json_is_text(field(message, path), text);
 }
@@ -72,6 +75,13 @@ const char *iwc_json(const iwc_message_t *message, const char *path, size_t *out
     const iwc_span_t value = field(message, path);
     *out_length = value.length;
     return value.at;
+}
+
+iwc_message_t iwc_field(iwc_cursor_t *self, const char *name) {
+    iwc_walk_t walk = {{self->message->text, self->message->length}, self->rest};
+    const iwc_span_t value = iwc_json_walk(&walk, name, strlen(name));
+    self->rest = walk.rest;
+    return (iwc_message_t){.text = value.at, .length = value.length, .is_event = self->message->is_event};
 }
 
 /// Reads the fields in the order of the gateway, so that one walk finds all. Another order only takes longer.
@@ -107,22 +117,26 @@ static iwc_machine_t machine_of(iwc_span_t state) {
 
 bool iwc_state(const iwc_t *self, const iwc_message_t *message, iwc_state_t *out_state) {
     iwc_walk_t snapshot = {{message->text, message->length}, NULL};
+    const iwc_span_t t_us = WALK(&snapshot, "t_us");
     const iwc_span_t state = WALK(&snapshot, "state");
+    const iwc_span_t cause = WALK(&snapshot, "cause");
     iwc_walk_t lease = {WALK(&snapshot, "lease"), NULL};
+    const iwc_span_t bus = WALK(&snapshot, "bus");
+    const iwc_span_t estop = WALK(&snapshot, "estop");
     const iwc_span_t left = WALK(&snapshot, "left");
     const iwc_span_t right = WALK(&snapshot, "right");
     if (left.at == NULL || right.at == NULL || lease.object.at == NULL || state.at == NULL) {
         return false;
     }
     memset(out_state, 0, sizeof(*out_state));
-    out_state->t_us = iwc_integer(message, "t_us").value;
+    out_state->t_us = integer_of(t_us).value;
     out_state->machine = machine_of(state);
-    (void)iwc_text(message, "cause", out_state->cause, sizeof out_state->cause);
+    (void)copy_text(cause, out_state->cause, sizeof out_state->cause);
     out_state->holder = integer_of(WALK(&lease, "holder"));
     out_state->ours = out_state->holder.known && self->number != 0 && out_state->holder.value == self->number;
     out_state->remaining_ms = integer_of(WALK(&lease, "remaining_ms"));
-    out_state->estop_released = iwc_is(message, "estop.state", "released");
-    out_state->bus_active = iwc_is(message, "bus.state", "active");
+    out_state->estop_released = iwc_json_is_text(iwc_json_find(estop, "state"), "released");
+    out_state->bus_active = iwc_json_is_text(iwc_json_find(bus, "state"), "active");
     read_wheel(left, &out_state->left);
     read_wheel(right, &out_state->right);
     return true;

@@ -8,13 +8,28 @@
 
 static const iwc_span_t NOTHING = {NULL, 0};
 
-bool iwc_json_is_object(const char *text, size_t length, bool trusted) {
+bool iwc_json_is_object(const char *text, size_t length) {
     char reason[1]; // The reason is not used.
     iwn_text_t fault = iwn_text_begin(reason, sizeof reason);
     iwn_work_t work;
     iwn_json_t root;
-    return iwn_json_check(text, length, trusted ? NULL : &work, &root, &fault) &&
-           iwn_json_kind(root) == IWN_JSON_OBJECT;
+    return iwn_json_check(text, length, &work, &root, &fault) && iwn_json_kind(root) == IWN_JSON_OBJECT;
+}
+
+bool iwc_json_is_trusted_object(const char *text, size_t length, iwc_stored_t *stored) {
+    char reason[1];
+    iwn_text_t fault = iwn_text_begin(reason, sizeof reason);
+    iwn_repeated_t repeated = {.value = stored->value, .length = stored->length};
+    iwn_json_t root;
+    if (!iwn_json_check_again(text, length, &repeated, &root, &fault) || iwn_json_kind(root) != IWN_JSON_OBJECT) {
+        return false;
+    }
+    const iwc_span_t value = repeated.met ? NOTHING : iwc_json_find((iwc_span_t){text, length}, "ledger");
+    if (value.length > 0 && value.length <= IWC_STORED_MAX && value.at[0] == '{') {
+        memcpy(stored->value, value.at, value.length);
+        stored->length = value.length;
+    }
+    return true;
 }
 
 static iwc_span_t skip_blanks(iwc_span_t text) {
@@ -53,6 +68,9 @@ iwc_span_t iwc_json_walk(iwc_walk_t *self, const char *key, size_t length) {
 
 iwc_span_t iwc_json_find(iwc_span_t object, const char *path) {
     size_t length = strcspn(path, ".");
+    if (path[0] == '\0') {
+        return object;
+    }
     while (path[length] == '.') {
         object = iwc_json_walk(&(iwc_walk_t){object, NULL}, path, length);
         path += length + 1U;

@@ -13,11 +13,23 @@ typedef struct {
     size_t length;
 } iwc_span_t;
 
-/// Returns true if the text is one object and otherwise only blanks. In a trusted text it does not search for equal
-/// names.
-bool iwc_json_is_object(const char *text, size_t length, bool trusted);
+/// Size of the longest stored value.
+#define IWC_STORED_MAX 8192U
 
-/// Returns the value at a path of keys, "left.speed_mm_s". `iwc_json_is_object` must be true for the object. Compares
+/// The value of the field `ledger` of the last event `state`: half of the event, and mostly equal to the one before.
+typedef struct {
+    size_t length; ///< 0: none.
+    char value[IWC_STORED_MAX];
+} iwc_stored_t;
+
+/// Returns true if the text is one object and otherwise only blanks.
+bool iwc_json_is_object(const char *text, size_t length);
+
+/// The same for a text of a trusted program: it does not search for equal names, and does not check the stored value
+/// again. Stores the value if it has changed.
+bool iwc_json_is_trusted_object(const char *text, size_t length, iwc_stored_t *stored);
+
+/// Returns the value at a path of keys, "left.speed_mm_s", or the object itself for "". `iwc_json_is_object` must be true for the object. Compares
 /// keys byte by byte.
 iwc_span_t iwc_json_find(iwc_span_t object, const char *path);
 

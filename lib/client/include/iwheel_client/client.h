@@ -153,7 +153,7 @@ typedef struct {
     int64_t value; ///< 0 if not known.
 } iwc_value_t;
 
-/// Returns the integer at a path such as "left.speed_mm_s". For a boolean use `iwc_truth`.
+/// Returns the integer at a path such as "left.speed_mm_s"; the path "" is the message. For a boolean use `iwc_truth`.
 IWC_API iwc_value_t iwc_integer(const iwc_message_t *message, const char *path);
 /// Returns the boolean at a path, as 1 or 0.
 IWC_API iwc_value_t iwc_truth(const iwc_message_t *message, const char *path);
@@ -168,6 +168,18 @@ IWC_API bool iwc_is(const iwc_message_t *message, const char *path, const char *
 
 /// Returns the JSON of any field inside the message, with its length; NULL: there is no such field.
 IWC_API const char *iwc_json(const iwc_message_t *message, const char *path, size_t *out_length);
+
+/// The position of a caller that reads many fields of a message: `{&message, NULL}` before the first one.
+typedef struct {
+    const iwc_message_t *message; ///< The message, or an object that `iwc_field` returned.
+    const char *rest;             ///< The text behind the last field.
+} iwc_cursor_t;
+
+/// Returns a field of the message itself, by its name and not by a path, as a message for the functions above: a path
+/// in it begins inside the field, and the path "" is the field. The search begins behind the last field, so that a
+/// caller who reads fields in the order of the gateway walks through a message once. Another order only takes longer.
+/// If there is no such field, `text` is NULL, and the functions above find nothing in it.
+IWC_API iwc_message_t iwc_field(iwc_cursor_t *self, const char *name);
 
 // ---- requests -----------------------------------------------------------------------------------------------------
 

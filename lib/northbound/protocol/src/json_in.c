@@ -8,6 +8,7 @@
 typedef struct {
     iwn_scan_t scan;
     iwn_work_t *work;              ///< NULL: do not search for equal names.
+    iwn_repeated_t *repeated;      ///< NULL: check every value.
     uint16_t names;                ///< Number of names in all open objects.
     uint16_t first[IWN_DEPTH_MAX]; ///< Index of the first name, per object.
     bool is_list[IWN_DEPTH_MAX];
@@ -58,6 +59,19 @@ static bool add_name(check_t *self) {
     return true;
 }
 
+/// Skips a value of the root that was checked before: a complete object or list, so its end is that of the value.
+static bool skip_repeated(check_t *self) {
+    iwn_repeated_t *const repeated = self->repeated;
+    if (repeated == NULL || self->depth != 1U || repeated->length == 0U ||
+        (size_t)(self->scan.end - self->scan.at) < repeated->length ||
+        memcmp(self->scan.at, repeated->value, repeated->length) != 0) {
+        return false;
+    }
+    self->scan.at += repeated->length;
+    repeated->met = true;
+    return true;
+}
+
 /// Checks a name and its colon, and reads the first token of the value to `*token`.
 static bool check_name(check_t *self, int *token) {
     if (*token != IWN_TOKEN_TEXT) {
@@ -72,7 +86,7 @@ static bool check_name(check_t *self, int *token) {
     if (!iwn_scan_skip(&self->scan, ':') && iwn_scan(&self->scan) != ':') {
         return fail(self, "':' expected");
     }
-    *token = iwn_scan(&self->scan);
+    *token = skip_repeated(self) ? IWN_TOKEN_SCALAR : iwn_scan(&self->scan);
     return true;
 }
 
@@ -146,22 +160,39 @@ static bool check_next(check_t *self) {
     return (in_list(self) || check_name(self, &token)) && check_value(self, token);
 }
 
-bool iwn_json_check(const char *text, size_t length, iwn_work_t *work, iwn_json_t *out_root, iwn_text_t *fault) {
-    check_t self = {.scan = {.text = text, .end = text + length, .at = text, .token = text, .fault = fault},
-                    .work = work};
-    const int token = (length <= IWN_JSON_MAX) ? iwn_scan(&self.scan) : IWN_TOKEN_END;
+static bool check_root(check_t *self, size_t length, iwn_json_t *out_root) {
+    const int token = (length <= IWN_JSON_MAX) ? iwn_scan(&self->scan) : IWN_TOKEN_END;
     if (token != '{' && token != '[') {
-        return fail(&self, "'[' or '{' expected");
+        return fail(self, "'[' or '{' expected");
     }
-    out_root->at = self.scan.token;
-    bool good = check_value(&self, token);
-    while (good && self.depth > 0U) {
-        good = check_next(&self);
+    out_root->at = self->scan.token;
+    bool good = check_value(self, token);
+    while (good && self->depth > 0U) {
+        good = check_next(self);
     }
+    return good && (iwn_scan(&self->scan) == IWN_TOKEN_END || fail(self, "end of file expected"));
+}
+
+static check_t begin(const char *text, size_t length, iwn_text_t *fault) {
+    return (check_t){.scan = {.text = text, .end = text + length, .at = text, .token = text, .fault = fault}};
+}
+
+bool iwn_json_check(const char *text, size_t length, iwn_work_t *work, iwn_json_t *out_root, iwn_text_t *fault) {
+    check_t self = begin(text, length, fault);
+    self.work = work;
+    const bool good = check_root(&self, length, out_root);
     if (work != NULL) {
         work->names = self.names;
     }
-    return good && (iwn_scan(&self.scan) == IWN_TOKEN_END || fail(&self, "end of file expected"));
+    return good;
+}
+
+bool iwn_json_check_again(const char *text, size_t length, iwn_repeated_t *repeated, iwn_json_t *out_root,
+                          iwn_text_t *fault) {
+    check_t self = begin(text, length, fault);
+    self.repeated = repeated;
+    repeated->met = false;
+    return check_root(&self, length, out_root);
 }
 
 // Walking a checked text ----------------------------------------------------------------------------------------------

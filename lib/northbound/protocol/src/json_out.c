@@ -10,53 +10,17 @@
 
 #define EXTENDED_ID_MASK 0x1FFFFFFFU
 
-/// Reserves this number of bytes and returns their position; NULL: they do not fit, and the line is invalid.
-static char *take(iwn_out_t *self, size_t length) {
+static void put(iwn_out_t *self, const char *text, size_t length) {
     if (self->overflow || length >= self->size - self->length) {
         self->overflow = true;
-        return NULL;
+        return;
     }
-    char *const at = &self->data[self->length];
+    memcpy(&self->data[self->length], text, length);
     self->length += length;
-    return at;
-}
-
-static void put(iwn_out_t *self, const char *text, size_t length) {
-    char *const at = take(self, length);
-    if (at != NULL) {
-        memcpy(at, text, length);
-    }
-}
-
-/// Writes comma, name and colon, and reserves a value of that length. Returns the position of the value; NULL: it does
-/// not fit.
-static char *begin(iwn_out_t *self, iwn_span_t name, size_t length) {
-    const size_t comma = self->comma ? 1U : 0U;
-    char *at = take(self, comma + ((name.text != NULL) ? name.length + 3U : 0U) + length);
-    self->comma = true;
-    if (at == NULL) {
-        return NULL;
-    }
-    *at = ',';
-    at += comma;
-    if (name.text != NULL) {
-        *at = '"';
-        memcpy(at + 1, name.text, name.length);
-        at += name.length + 1U;
-        at[0] = '"';
-        at[1] = ':';
-        at += 2;
-    }
-    return at;
 }
 
 void iwn_out_init(iwn_out_t *self, char *data, size_t size) {
     *self = (iwn_out_t){.data = data, .size = size};
-}
-
-void iwn_out_bracket(iwn_out_t *self, iwn_span_t name, char bracket) {
-    iwn_out_span(self, name, (iwn_span_t){&bracket, 1U});
-    self->comma = false;
 }
 
 void iwn_out_close(iwn_out_t *self, char bracket) {
@@ -65,17 +29,10 @@ void iwn_out_close(iwn_out_t *self, char bracket) {
 }
 
 void iwn_out_span(iwn_out_t *self, iwn_span_t name, iwn_span_t value) {
-    char *const at = begin(self, name, value.length);
+    char *const at = iwn_out_begin(self, name, value.length);
     if (at != NULL) {
         memcpy(at, value.text, value.length);
     }
-}
-
-void iwn_out_number(iwn_out_t *self, iwn_span_t name, int64_t value) {
-    char digits[IWN_DIGITS_MAX];
-    char *const end = digits + sizeof digits;
-    const char *const first = iwn_digits(value, end);
-    iwn_out_span(self, name, (iwn_span_t){first, (size_t)(end - first)});
 }
 
 void iwn_out_numbers(iwn_out_t *self, const char *names, const uint32_t *values) {
@@ -121,7 +78,7 @@ void iwn_out_string(iwn_out_t *self, iwn_span_t name, const char *text) {
     }
     const size_t length = strlen(text);
     const size_t plain = iwn_plain_length(text, length);
-    char *const at = begin(self, name, plain + ((plain == length) ? 2U : 1U));
+    char *const at = iwn_out_begin(self, name, plain + ((plain == length) ? 2U : 1U));
     if (at == NULL) {
         return;
     }

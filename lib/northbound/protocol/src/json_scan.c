@@ -9,6 +9,8 @@
 #define REAL_EXPONENT_MAX 308
 /// A larger exponent has the same result as this one, however many digits come before it.
 #define EXPONENT_FAR 1000000
+/// An integer with fewer digits has at most 64 bits.
+#define INTEGER_CERTAIN 19
 
 /// Results of `peek` other than a byte.
 enum { PEEK_END = -1, PEEK_BROKEN = -2 };
@@ -220,6 +222,9 @@ static bool skip_digits(iwn_scan_t *self, int *c) {
 
 /// Checks that the integer has at most 64 bits.
 static int check_integer(iwn_scan_t *self) {
+    if (self->at - self->token < INTEGER_CERTAIN) {
+        return IWN_TOKEN_SCALAR;
+    }
     const bool negative = *self->token == '-';
     const uint64_t most = negative ? (uint64_t)INT64_MAX + 1U : (uint64_t)INT64_MAX;
     uint64_t number = 0;
@@ -350,10 +355,6 @@ int iwn_scan(iwn_scan_t *self) {
     if (c < 0) {
         return (c == PEEK_END) ? IWN_TOKEN_END : IWN_TOKEN_INVALID;
     }
-    if (is_mark(c)) {
-        self->at++;
-        return c;
-    }
     if (c == '"') {
         return scan_text(self);
     }
@@ -362,6 +363,10 @@ int iwn_scan(iwn_scan_t *self) {
     }
     if (iwn_scan_is_letter(c)) {
         return scan_word(self);
+    }
+    if (is_mark(c)) {
+        self->at++;
+        return c;
     }
     self->at += character_length(self);
     return IWN_TOKEN_INVALID;

@@ -182,19 +182,30 @@ static char *digits_32(uint32_t number, char *end) {
     return end;
 }
 
+static uint64_t without_sign(int64_t number) {
+    return (number < 0) ? 0U - (uint64_t)number : (uint64_t)number;
+}
+
+size_t iwn_digits_length(int64_t number) {
+    const uint64_t rest = without_sign(number);
+    size_t length = (number < 0) ? 2U : 1U;
+    for (uint64_t limit = 10U; rest >= limit; limit *= 10U) { // The largest limit has 20 digits and fits.
+        length++;
+    }
+    return length;
+}
+
 char *iwn_digits(int64_t number, char *end) {
-    uint64_t rest = (number < 0) ? 0U - (uint64_t)number : (uint64_t)number;
-    while (rest > UINT32_MAX) {
-        const uint64_t high = rest / 1000000000U;
-        char *const begin = end - 9;
-        char *at = digits_32((uint32_t)(rest - high * 1000000000U), end);
-        while (at > begin) {
-            *--at = '0';
-        }
-        end = begin;
+    uint64_t rest = without_sign(number);
+    bool last = false;
+    while (!last) {
+        last = rest <= UINT32_MAX;
+        const uint64_t high = last ? 0U : rest / 1000000000U;
+        char *const at = digits_32((uint32_t)(rest - high * 1000000000U), end);
+        end = last ? at : end - 9;
+        memset(end, '0', (size_t)(at - end)); // Leading zeros of the lower nine digits.
         rest = high;
     }
-    end = digits_32((uint32_t)rest, end);
     if (number < 0) {
         *--end = '-';
     }

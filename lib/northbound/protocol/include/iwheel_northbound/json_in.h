@@ -60,6 +60,18 @@ typedef struct {
 /// for equal names in an object, for the line of a trusted program.
 bool iwn_json_check(const char *text, size_t length, iwn_work_t *work, iwn_json_t *out_root, iwn_text_t *fault);
 
+/// A member of a root that repeats from text to text. The owner clears it, and sets it after a check of a text that has
+/// the member.
+typedef struct {
+    const char *value; ///< Checked object or list that a member of the root had before.
+    size_t length;     ///< 0: none.
+    bool met;          ///< Set by the check: a member has this value again.
+} iwn_repeated_t;
+
+/// Checks a text of a trusted program like iwn_json_check without `work`, but does not check the value `repeated` again.
+bool iwn_json_check_again(const char *text, size_t length, iwn_repeated_t *repeated, iwn_json_t *out_root,
+                          iwn_text_t *fault);
+
 /// Returns the object or list of a checked text.
 iwn_json_t iwn_json_root(const char *text);
 

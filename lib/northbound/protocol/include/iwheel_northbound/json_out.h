@@ -6,13 +6,14 @@
 /// and the caller must not use the line. Strings are escaped: `\uXXXX` for characters that are not plain (text.h), and
 /// U+FFFD for bytes that are not UTF-8. Names are constants of the program that need no escape. No heap, no stdio.
 ///
-/// Each element is written as a whole, in one or two copies. The functions with a name argument are inline, so that the
-/// compiler knows the length of a literal, unless the program is compiled for size.
+/// Each element is written as a whole and in place. The functions with a name argument are inline, so that a literal is
+/// written by a few stores, unless the program is compiled for size.
 #ifndef IWHEEL_NORTHBOUND_JSON_OUT_H
 #define IWHEEL_NORTHBOUND_JSON_OUT_H
 
 #include "iwheel/can_frame.h"
 #include "iwheel/types.h"
+#include "iwheel_northbound/text.h"
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -52,8 +53,6 @@ void iwn_out_frame(const iw_can_frame_t *frame, iw_time_us_t at_us, iwn_out_t *j
 
 /// Writes a value that is JSON: `true`, a number, an object written before.
 void iwn_out_span(iwn_out_t *self, iwn_span_t name, iwn_span_t value);
-/// Writes an integer.
-void iwn_out_number(iwn_out_t *self, iwn_span_t name, int64_t value);
 /// Writes several integers. Each of `names` ends with a zero byte, and the last with another one.
 void iwn_out_numbers(iwn_out_t *self, const char *names, const uint32_t *values);
 /// Does the same with the values as arguments: IWN_OUT_NUMBERS(json, "first\0second\0", 1, 2). The terminator of the
@@ -61,8 +60,6 @@ void iwn_out_numbers(iwn_out_t *self, const char *names, const uint32_t *values)
 #define IWN_OUT_NUMBERS(self, names, ...) iwn_out_numbers((self), (names), (const uint32_t[]){__VA_ARGS__})
 /// Writes a string; `null` for NULL.
 void iwn_out_string(iwn_out_t *self, iwn_span_t name, const char *text);
-/// Opens an object or list like `iwn_out_open`, with the name as a span.
-void iwn_out_bracket(iwn_out_t *self, iwn_span_t name, char bracket);
 
 /// Returns the span of a terminated text; empty for NULL.
 static inline iwn_span_t iwn_span(const char *text) {
@@ -77,6 +74,10 @@ static inline iwn_span_t iwn_span(const char *text) {
 /// The functions with a name argument are inline.
 #define IWN_OUT_INLINE static inline
 #endif
+
+/// Writes comma, name and colon, and reserves `length` bytes for the value. Returns their position; NULL: the element
+/// does not fit.
+IWN_OUT_INLINE char *iwn_out_begin(iwn_out_t *self, iwn_span_t name, size_t length);
 
 /// Opens an object or list. `bracket` is '{' or '['; close it with '}' or ']'.
 IWN_OUT_INLINE void iwn_out_open(iwn_out_t *self, const char *name, char bracket);

@@ -50,6 +50,9 @@ size_t iwn_utf8(uint32_t code_point, char out_bytes[4]);
 char *iwn_digits(int64_t number, char *end);
 #define IWN_DIGITS_MAX 20U ///< Bytes of the longest number, with its sign.
 
+/// Returns the number of bytes that `iwn_digits` writes for a number.
+size_t iwn_digits_length(int64_t number);
+
 /// Text in a buffer of its owner. It is always terminated; parts that do not fit are omitted.
 typedef struct {
     char *data;    ///< The buffer.
