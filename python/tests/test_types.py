@@ -45,13 +45,13 @@ class Events(unittest.TestCase):
         self.assertEqual(mypy(PROGRAM), [])
 
     def test_event_misspelt_field_fails_mypy_strict(self):
-        for right, wrong in (("sentence", "sentense"), ("speed_mm_s", "speed_mms"), ('"message"', '"mesage"')):
+        for right, wrong in (("sentence", "sentences"), ("speed_mm_s", "speed_mm"), ('"message"', '"messages"')):
             errors = mypy(PROGRAM.replace(right, wrong))
             self.assertEqual(len(errors), 1, errors)
             self.assertIn("has no key", errors[0])
 
     def test_event_misspelt_name_fails_mypy_strict(self):
-        self.assertTrue(mypy(PROGRAM.replace('== "stop"', '== "stopp"')))
+        self.assertTrue(mypy(PROGRAM.replace('== "stop"', '== "stops"')))
 
 
 class Names(unittest.TestCase):
