@@ -10,9 +10,11 @@ import sys
 import tempfile
 import unittest
 
-import can
-import pandas
-from mcap.reader import make_reader
+import pytest
+
+can = pytest.importorskip("can")
+pandas = pytest.importorskip("pandas")
+make_reader = pytest.importorskip("mcap.reader").make_reader
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 ROOT = os.path.dirname(os.path.dirname(HERE))

@@ -36,8 +36,9 @@ def library(to: str, module: str) -> Any:
     try:
         return importlib.import_module(module)
     except ImportError as error:
-        package = {"mcap": "mcap", "blf": "python-can"}[to]
-        raise RecordingError(f"--to {to} needs the Python package {package}; install it: {sys.executable} -m pip install {package}") from error
+        package, other = {"mcap": ("mcap", ""), "blf": ("python-can", "apt-get install python3-can, or ")}[to]
+        fix = f"{other}in a virtual environment {sys.executable} -m pip install {package}"
+        raise RecordingError(f"--to {to} needs the Python package {package}; install it: {fix}") from error
 
 
 def samples(options: argparse.Namespace, use: Callable[[IO[bytes]], None]) -> int:
