@@ -13,7 +13,7 @@ import time
 import unittest
 
 import pytest
-from rig import ROOT, RigCase, now_us
+from rig import SOURCES, RigCase, now_us
 from stand_in import StandIn
 
 from iwheel import AsyncGateway, Refused
@@ -356,7 +356,7 @@ class CancelledWithRig(RigCase):
     def run_program(self, script, *end):
         child = subprocess.Popen(
             [sys.executable, "-c", "import asyncio, os, sys, threading, time\nfrom iwheel import *\n" + script, self.socket],
-            env={**os.environ, "PYTHONPATH": os.pathsep.join([os.path.join(ROOT, "python", "src"), os.environ.get("PYTHONPATH", "")])},
+            env={**os.environ, "PYTHONPATH": os.pathsep.join([SOURCES, os.environ.get("PYTHONPATH", "")])},
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,

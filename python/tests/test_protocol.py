@@ -12,7 +12,9 @@ import time
 import unittest
 
 import pytest
-from rig import BUILD, ROOT, RigCase
+from rig import BUILD, ROOT, RigCase, require_gateway
+
+require_gateway()
 
 import iwheel
 from client import Closed

@@ -14,7 +14,7 @@ import warnings
 from fractions import Fraction
 
 import pytest
-from rig import ROOT, RigCase, now_us
+from rig import SOURCES, RigCase, now_us
 
 from iwheel import AsyncGateway, ConnectionLost, Gateway, GatewayUnavailable, LeaseEnded, NoAnswer, ProtocolError, Refused
 from iwheel._wire import add_piece
@@ -155,7 +155,7 @@ class Driving(RigCase):
         self.assertLess(self.last_motion_us(), frozen_us + BUDGET_MS * 1000, "it moved again after waking up")
 
     def python(self, script):
-        environment = {**os.environ, "PYTHONPATH": os.path.join(ROOT, "python", "src")}
+        environment = {**os.environ, "PYTHONPATH": SOURCES}
         child = subprocess.Popen([sys.executable, "-c", script, self.socket], env=environment, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
 
         def end():

@@ -19,7 +19,7 @@ from harness import find_program
 pytestmark = pytest.mark.native("processor time: these start hundreds of programs and hardly wait")
 BUILD = os.environ["IWHEEL_BUILD"]
 # Those that talk with a person.
-WITHOUT_JSON = {"top", "bringup", "help", "web"}
+WITHOUT_JSON = {"top", "bringup", "help", "web", "export"}
 
 
 def run(*words, program="iwheelctl", path=None, **more):

@@ -202,7 +202,7 @@ class _Stream(asyncio.Protocol):
         if len(self.events) >= EVENTS_KEPT:
             self.events.popleft()
             self._lost += 1
-        self.events.append(message)
+        self.events.append(cast(Event, message))
         self.came.set()
 
     def _no_answer(self, future: asyncio.Future[Message], cmd: str, timeout: float) -> None:

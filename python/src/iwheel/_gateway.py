@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import math
+import os
 import threading
 import time
 import warnings
@@ -14,6 +16,7 @@ from collections.abc import Iterator
 from ._connection import Connection
 from ._errors import GatewayUnavailable, IWheelError, LeaseEnded, NoAnswer, ProtocolError, Refused
 from ._protocol import Configured, Confirmed, Hello, OnRequest, Piece, RecordingEntry, State, Status, Stop, Tared, Watched
+from ._record import record
 from ._stop import stop_by_either
 from ._types import Applied, Event, OnStatus, Terms, Whole
 from ._wire import (
@@ -127,6 +130,14 @@ class Gateway:
             if event is None:
                 return
             yield event
+
+    def record(self, path: str | os.PathLike[str], seconds: float = math.inf) -> int:
+        """Writes all frames of the bus to a new file, in the form of candump -L, for that time or until Ctrl-C (KeyboardInterrupt). Moves nothing.
+
+        Returns the number of frames. It continues after a lost connection; a comment in the file marks missing frames. `read_recording` reads the
+        file. It replaces the subscription of `watch`, and ends it.
+        """
+        return record(self, path, seconds)
 
     # Stopping: always allowed ----------------------------------------------------------------------------------------
 

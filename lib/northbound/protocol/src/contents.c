@@ -16,12 +16,7 @@ static bool contradicted(const iw_snapshot_t *seen, iw_assumption_item_t item) {
     return seen->assumed[item].state == IW_CONTRADICTED;
 }
 
-/// Returns true if speeds in mm/s and distances are valid: they depend on radius and gear ratio.
-static bool is_speed_known(const iw_snapshot_t *seen) {
-    return !contradicted(seen, IW_ASSUMPTION_WHEEL_RADIUS) &&
-           !(seen->config->rpm_of_rotor && contradicted(seen, IW_ASSUMPTION_GEAR_RATIO));
-}
-
+/// Returns true if distances are valid: they depend on radius and gear ratio.
 static bool is_distance_known(const iw_snapshot_t *seen) {
     return !contradicted(seen, IW_ASSUMPTION_WHEEL_RADIUS) && !contradicted(seen, IW_ASSUMPTION_GEAR_RATIO);
 }
@@ -40,7 +35,7 @@ static void write_motion(const iw_snapshot_t *seen, iw_side_t side, iwn_out_t *j
         iwn_out_null(json, "at_rest");
     }
     iwn_out_known32(json, "speed_rpm", online, wheel->told->speed.speed_rpm);
-    iwn_out_known32(json, "speed_mm_s", online && is_speed_known(seen), wheel->speed_mm_s);
+    iwn_out_known32(json, "speed_mm_s", online && iwn_is_speed_known(seen), wheel->speed_mm_s);
     iwn_out_known32(json, "acceleration_raw", online, wheel->told->speed.acceleration_raw);
     iwn_out_known32(json, "commanded_mm_s", following, wanted.speed_mm_s);
     iwn_out_known32(json, "commanded_mA", following, wanted.current_mA);

@@ -14,6 +14,10 @@
 #include "iwheel_northbound/json_in.h"
 #include "iwheel_northbound/words.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /// Largest number of bytes of a request without its newline.
 #define IWN_LINE_MAX        4096U
 #define IWN_ID_TEXT_MAX     64U  ///< Bytes of an id that is a text.
@@ -115,4 +119,7 @@ bool iwn_refuse(iwn_refusal_t *out_refusal, iwn_error_t error, const char *const
 bool iwn_request_read(const char *line, size_t length, iwn_work_t *work, iwn_request_t *out_request,
                       iwn_refusal_t *out_refusal);
 
+#ifdef __cplusplus
+}
+#endif
 #endif

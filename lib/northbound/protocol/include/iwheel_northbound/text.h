@@ -15,6 +15,10 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /// Code point of a byte that is not UTF-8.
 #define IWN_PLAIN_BROKEN UINT32_MAX
 
@@ -74,4 +78,7 @@ void iwn_text_hex(iwn_text_t *self, uint32_t number, unsigned digits);
 /// Appends texts; the last one is NULL.
 void iwn_text_join(iwn_text_t *self, const char *const *texts);
 
+#ifdef __cplusplus
+}
+#endif
 #endif

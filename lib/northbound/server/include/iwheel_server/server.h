@@ -17,6 +17,10 @@
 #include "iwheel_northbound/contents.h"
 #include "iwheel_northbound/refuse.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /// A repeated software e-stop within this time while its latch holds is answered and changes nothing.
 #define IWN_ESTOP_AGAIN_US 100000U
 /// Time after the start in which the first telemetry arrives. Before it a wheel without telemetry is not reported as a
@@ -145,4 +149,7 @@ void iwn_server_write_status(iwn_server_t *self, const iw_snapshot_t *seen, iwn_
 /// Sends the event `hello` to a new client.
 void iwn_server_hello(iwn_server_t *self, iwn_client_t *client);
 
+#ifdef __cplusplus
+}
+#endif
 #endif
