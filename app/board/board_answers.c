@@ -70,17 +70,13 @@ bool iwn_target_is_key(iwn_server_t *server, const iwn_client_t *client, const c
 /// Returns the defect of a quote, or NULL if there is none. A stamp from before the channel was opened belongs to
 /// another client.
 static const char *stale(const brd_host_t *self, const brd_host_client_t *client, const iwn_quote_t *quote) {
-    uint64_t boot = 0;
+    char boot[IWN_LINE_BOOT + 1U];
     if (quote == NULL) {
         return "it quotes no start of the board: a command that moves begins with boot, seq and t_us, which "
                "iwheel-serial "
                "puts there";
     }
-    for (unsigned i = 0; i < IWN_LINE_BOOT; i++) {
-        const char digit = quote->boot[i];
-        boot = boot << 4 | (uint64_t)((digit <= '9') ? digit - '0' : digit - 'a' + 10);
-    }
-    if (boot != self->boot) {
+    if (strcmp(brd_host_boot_text(self->boot, boot), quote->boot) != 0) {
         return "it was meant for an earlier start of the board";
     }
     if (client->has_seq && quote->seq <= client->seq) {

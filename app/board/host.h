@@ -133,6 +133,9 @@ iw_time_us_t brd_host_report(brd_host_t *self, const iw_snapshot_t *seen, bool e
 
 // For the files of this part.
 
+/// Writes the id of this start as hexadecimal digits. Returns `out_text`.
+const char *brd_host_boot_text(uint64_t boot, char out_text[IWN_LINE_BOOT + 1U]);
+
 /// Reports to the client the number of its dropped lines, if that line fits the ring.
 void brd_host_report_lost(brd_host_t *self, brd_host_client_t *client);
 /// Sends the event `link`, which identifies the board, on the channel of the link.

@@ -10,7 +10,7 @@
 
 #define CHANNEL_LINK 0U
 
-static const char *boot_text(uint64_t boot, char out_text[IWN_LINE_BOOT + 1U]) {
+const char *brd_host_boot_text(uint64_t boot, char out_text[IWN_LINE_BOOT + 1U]) {
     for (unsigned i = 0; i < IWN_LINE_BOOT; i++) {
         out_text[i] = "0123456789abcdef"[boot >> (60U - 4U * i) & 15U];
     }
@@ -135,7 +135,7 @@ void brd_host_send_status(brd_host_t *self, brd_host_client_t *client, const iw_
 void brd_host_report_link(brd_host_t *self) {
     char boot[IWN_LINE_BOOT + 1U];
     iwn_out_t json = iwn_server_begin_event(&self->server, "link");
-    iwn_out_text(&json, "boot", boot_text(self->boot, boot));
+    iwn_out_text(&json, "boot", brd_host_boot_text(self->boot, boot));
     iwn_out_text(&json, "version", self->server.version);
     IWN_OUT_NUMBERS(&json, "line_bytes\0channels\0silent_ms\0", BRD_HOST_LINE_BYTES, IWN_LINE_CHANNELS,
                     IWN_LINE_SILENT_MS);
