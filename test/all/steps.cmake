@@ -139,7 +139,7 @@ test(idle python.types check lint "" py:mypy 10 sh -c "cd python && ../.venv/bin
 test(idle python check scenario "default;kernel.build" py:pytest 80 ${PYTEST} python/tests --build ${B} --virtual --jobs ${JOBS})
 test(real python.realtime check realtime default py:pytest 25 ${PYTEST} python/tests --build ${B} --jobs 3 -m native)
 set(files test/ctl/test_recordings.py test/ctl/test_learn_table.py) # They only compute.
-test(idle ctl check scenario "default;kernel.build" py:pytest 160 ${PYTEST} test/ctl --build ${B} --virtual --jobs ${JOBS} --ignore-glob=*/test_recordings.py --ignore-glob=*/test_learn_table.py)
+test(idle ctl check scenario "default;kernel.build" py:pytest 190 ${PYTEST} test/ctl --build ${B} --virtual --jobs ${JOBS} --ignore-glob=*/test_recordings.py --ignore-glob=*/test_learn_table.py)
 test(idle ctl.files check unit default py:pytest 6 ${PYTEST} ${files} --build ${B} --jobs ${JOBS})
 test(real ctl.realtime check realtime default py:pytest 36 ${PYTEST} test/ctl --build ${B} --jobs 4 -m native)
 test(real captures check realtime default "" 22 python3 test/ctl/captures --build ${B} --check)
