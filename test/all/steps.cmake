@@ -96,12 +96,12 @@ test(idle mutation.around check+full faults default "" 120 test/mutation/around 
 test(real verdicts check faults "" "" 22 python3 test/support/test_verdict.py)
 test(real verdicts.pytest check faults "" py:pytest 60 ${PY} test/support/test_pytest_verdict.py)
 # In virtual time; natively those that only real time shows, and 20 others selected by the hash of the commit. `realtime` runs the remaining ones natively.
-test(idle system check+full scenario "default;kernel.build" py:pytest 90 ${PYTEST} test/system --build ${B} --virtual --jobs ${JOBS})
-test(real system.realtime check+full realtime default py:pytest 45 ${PYTEST} test/system --build ${B} --jobs 4 --sample 20)
+test(idle system check+full scenario "default;kernel.build" py:pytest 110 ${PYTEST} test/system --build ${B} --virtual --jobs ${JOBS})
+test(real system.realtime check+full realtime default py:pytest 60 ${PYTEST} test/system --build ${B} --jobs 4 --sample 20)
 foreach(seed 1 2 3)
-    test(idle delays.${seed} ci+full scenario "default;kernel.build" py:pytest 90 ${PYTEST} test/system --build ${B} --virtual --jobs ${JOBS} --delays ${seed})
+    test(idle delays.${seed} ci+full scenario "default;kernel.build" py:pytest 110 ${PYTEST} test/system --build ${B} --virtual --jobs ${JOBS} --delays ${seed})
 endforeach()
-test(real realtime ci+full realtime default py:pytest 90 ${PYTEST} test/system --build ${B} --jobs 4 --sample=-20)
+test(real realtime ci+full realtime default py:pytest 115 ${PYTEST} test/system --build ${B} --jobs 4 --sample=-20)
 test(idle ros2.hours check+full safety default ${B}/app/bridge/ros2/iwheel-ros2 10 ${B}/test/ros2/ros2_hours ${ros2_hours})
 test(real ros2 check+full realtime default "${B}/app/bridge/ros2/iwheel-ros2 py:cyclonedds py:rosbags py:pytest" 46 ${PYTEST} test/ros2 --build ${B} --jobs 4 --ignore test/ros2/test_typed.py)
 # Programs by other authors. Without ROS 2 Jazzy, which ./check installs, these scenarios are skipped.
@@ -140,9 +140,9 @@ test(idle python.types check lint "" py:mypy 10 sh -c "cd python && ../.venv/bin
 test(idle python check scenario "default;kernel.build" py:pytest 80 ${PYTEST} python/tests --build ${B} --virtual --jobs ${JOBS})
 test(real python.realtime check realtime default py:pytest 25 ${PYTEST} python/tests --build ${B} --jobs 3 -m native)
 set(files test/ctl/test_recordings.py test/ctl/test_learn_table.py) # They only compute.
-test(idle ctl check scenario "default;kernel.build" py:pytest 160 ${PYTEST} test/ctl --build ${B} --virtual --jobs ${JOBS} --ignore-glob=*/test_recordings.py --ignore-glob=*/test_learn_table.py)
-test(idle ctl.files check unit default py:pytest 20 ${PYTEST} ${files} --build ${B} --jobs ${JOBS})
-test(real ctl.realtime check realtime default py:pytest 60 ${PYTEST} test/ctl --build ${B} --jobs 4 -m native)
+test(idle ctl check scenario "default;kernel.build" py:pytest 190 ${PYTEST} test/ctl --build ${B} --virtual --jobs ${JOBS} --ignore-glob=*/test_recordings.py --ignore-glob=*/test_learn_table.py)
+test(idle ctl.files check unit default py:pytest 6 ${PYTEST} ${files} --build ${B} --jobs ${JOBS})
+test(real ctl.realtime check realtime default py:pytest 36 ${PYTEST} test/ctl --build ${B} --jobs 4 -m native)
 test(real captures check realtime default "" 22 python3 test/ctl/captures --build ${B} --check)
 # The demo exits with 0 even if it could not judge the timing; here that is no success.
 test(real demo check realtime "" "" 40 python3 test/support/verdict.py --run demo bash -o pipefail -c "./demo </dev/null 2>&1 | tee build/check/demo.said && ! grep -q 'Timing was not judged' build/check/demo.said")

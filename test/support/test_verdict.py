@@ -290,7 +290,7 @@ class Processes(unittest.TestCase):
 
 
 class Check(unittest.TestCase):
-    """./check with the step `system`, whose pytest is a script of this test, and with `unit`, whose tests are a file with CTest's output.
+    """./check with the test `system.realtime`, whose pytest is a script of this test, and with `unit`, whose tests are a file with CTest's output.
     Both wait for the build, which does nothing here and counts as one."""
 
     FILES = ("check", "docs/developer/proofs.csv", START, COUNT, "test/all/CMakeLists.txt", "test/all/steps.cmake")
@@ -338,12 +338,12 @@ class Check(unittest.TestCase):
         fi
         echo "4 passed, 0 failed, 0 skipped"
         """
-        status, lines, ran = self.check(once, "system")
+        status, lines, ran = self.check(once, "system.realtime")
         self.assertEqual((1, "4 passed, 1 failed, 0 skipped", 1), (status, lines[-1], ran), lines)
 
     def test_check_shows_the_reason_that_follows_a_failure(self):
         runner = "echo 'FAIL row11'; for i in 1 2 3 4 5; do echo \"  reason $i\"; done; seq 100 199; echo '0 passed, 1 failed, 0 skipped'; exit 1\n"
-        _, lines, _ = self.check(runner, "system")
+        _, lines, _ = self.check(runner, "system.realtime")
         shown = "\n".join(lines)
         for what in ("FAIL row11", *(f"  reason {i}" for i in range(1, 5)), "199"):
             self.assertIn(what, shown)
@@ -355,29 +355,29 @@ class Check(unittest.TestCase):
             "echo 'FAIL: test_x (x.X)'; seq 301 309; echo \"AssertionError: 'ready' did not come; after the last text came:\"\n"
             "echo busy; seq 401 430; seq 501 540; exit 1\n"
         )
-        shown = "\n".join(self.check(runner, "system")[1])
+        shown = "\n".join(self.check(runner, "system.realtime")[1])
         for what in ("FAIL: test_x", "AssertionError: 'ready'", ": busy", ": 401", ": 418"):
             self.assertIn(what, shown)
         for what in (": 309", ": 419"):
             self.assertNotIn(what, shown)
 
     def test_not_judged_is_75_and_named(self):
-        status, lines, _ = self.check(f"cd {HERE}; python3 -c 'import sys, verdict; sys.exit(verdict.summary(2, 0, 1, [\"row11\"]))'\n", "system")
+        status, lines, _ = self.check(f"cd {HERE}; python3 -c 'import sys, verdict; sys.exit(verdict.summary(2, 0, 1, [\"row11\"]))'\n", "system.realtime")
         self.assertEqual((75, "3 passed, 0 failed, 1 skipped"), (status, lines[-1]), lines)
-        self.assertRegex(lines[-2], "^real time not judged: system;")
+        self.assertRegex(lines[-2], "^real time not judged: system.realtime;")
         self.assertRegex(lines[-3], "^1 inconclusive, counted as skipped")
 
     def test_inconclusive_test_alone_is_reported_and_no_failure(self):
-        status, lines, _ = self.check(f"cd {HERE}; python3 -c 'import sys, verdict; sys.exit(verdict.summary(3, 0, 1, [\"row11\"]))'\n", "system")
+        status, lines, _ = self.check(f"cd {HERE}; python3 -c 'import sys, verdict; sys.exit(verdict.summary(3, 0, 1, [\"row11\"]))'\n", "system.realtime")
         self.assertEqual((0, "4 passed, 0 failed, 1 skipped"), (status, lines[-1]), lines)
         self.assertRegex(lines[-2], "^1 inconclusive, counted as skipped")
 
     def test_runner_that_dies_of_another_status_fails_check(self):
         for number in (1, 74, 134):
-            self.assertEqual(1, self.check(f"echo '4 passed, 0 failed, 0 skipped'; exit {number}\n", "system")[0])
+            self.assertEqual(1, self.check(f"echo '4 passed, 0 failed, 0 skipped'; exit {number}\n", "system.realtime")[0])
 
     def test_runner_killed_fails_check_which_shows_its_output(self):
-        status, lines, _ = self.check("echo as far as this; kill -9 $PPID; sleep 5\n", "system")
+        status, lines, _ = self.check("echo as far as this; kill -9 $PPID; sleep 5\n", "system.realtime")
         self.assertEqual((1, "1 passed, 1 failed, 0 skipped"), (status, lines[-1]), lines)
         self.assertTrue([line for line in lines if line.endswith("as far as this")], lines)
 
@@ -395,7 +395,7 @@ class Check(unittest.TestCase):
 
     def test_failure_of_one_step_outranks_inconclusive_step(self):
         late = self.case("1 inconclusive, counted as skipped: a\nreal time not judged: more\n2 passed, 0 failed, 1 skipped\n")
-        self.assertEqual(1, self.check("echo '1 passed, 1 failed, 0 skipped'; exit 1\n", "unit", "system", junit=late)[0])
+        self.assertEqual(1, self.check("echo '1 passed, 1 failed, 0 skipped'; exit 1\n", "unit", "system.realtime", junit=late)[0])
 
 
 def suite(classes=(Conclusive, Inconclusive, Status, Words)):
