@@ -10,6 +10,7 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 PAGE = ROOT / "docs/developer/speed.md"
 README = ROOT / "README.md"
 PROCESS = "## The gateway as a process"
+BUILDS = "## Building and installing"
 TIMED = "## Beside floor and peers"
 README_ROWS = {  # Row of the page, and its name in the README.
     "x86-64 decode": "read a frame, id and length checked: instructions on x86-64",
@@ -63,6 +64,20 @@ def put_process(measured):
             "Over the local bus with two simulated wheels (617 frames/s), on the machine that wrote this page. Not checked: it depends on the machine.",
             "",
             *table(["", "figure", "goal"], [list(row) for row in measured]),
+        ],
+    )
+
+
+def put_builds(measured):
+    has_packages = any(name.startswith("package ") for name, _ in measured)
+    source = "The packages are those of `test/debian/run --build`." if has_packages else "The sizes of the packages need `test/debian/run --build` first."
+    put(
+        BUILDS,
+        [
+            f"Made by `test/bench/run --builds` on {machine()}. A build from blank, without a compiler cache, as `RelWithDebInfo`; everything includes all tests. Processor time "
+            f"hardly depends on other load on the machine, elapsed time does. {source} Not checked.",
+            "",
+            *table(["", "figure"], measured),
         ],
     )
 
