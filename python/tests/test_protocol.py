@@ -264,6 +264,7 @@ class Story(unittest.TestCase):
         self.rig.sim.ask("estop release")
         self.ask(me, "estop", reason="a test")
         self.wait(me, lambda _: self.ask(me, "why")["recording"] is not None)
+        self.recording_on_request(me)
         self.ask(me, "recording", name="../gateway.conf", refused="bad_value")
         name = self.ask(me, "recordings")["recordings"][-1]["name"]
         self.ask(me, "recording", name=f"{name}.log")
@@ -287,6 +288,14 @@ class Story(unittest.TestCase):
         self.wait(me, lambda s: s["right"]["wheel_offset_mN"] is not None)
         self.wait_rest(me)
 
+    def recording_on_request(self, me):
+        self.ask(me, "record", on=True)
+        self.wait(me, lambda _: self.ask(me, "recordings")["on_request"]["name"] is not None)
+        self.ask(me, "record", on=True)  # It runs already.
+        self.ask(me, "record", on=False)
+        self.wait(me, lambda _: self.ask(me, "recordings")["on_request"]["ended"] == "request")
+        self.ask(me, "record", on=False)
+
     def bus(self, me, _):
         self.rig.sim.ask("foreign once 100")
         self.wait(me, lambda s: "second_master" in s["present"])
@@ -303,10 +312,13 @@ class Story(unittest.TestCase):
             pass
         self.ask(me, "estop")
         self.wait(me, lambda _: self.ask(me, "why")["recording_error"] is not None)
+        self.wait_granted(me, "record", on=True)
+        self.wait(me, lambda _: self.ask(me, "record", on=False)["fault"] is not None)
         self.ask(me, "confirm", item="gear_ratio")
         self.wait(me, lambda s: s["memory"]["state"] == "failed")
         os.unlink(self.records)
         os.mkdir(self.records)
+        self.ask(me, "recordings")
 
     def another_start(self):
         """Starts without a setpoint type, and with the second contact of the e-stop."""

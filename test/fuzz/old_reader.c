@@ -85,6 +85,7 @@ static const field_t fields[] = {
     {"how", IN(how), IWN_HOW_SIZE - 1U, BIT(IWN_CMD_CONFIRM), false, FIELD_TEXT},
     {"name", IN(file), IWN_FILE_MAX, BIT(IWN_CMD_RECORDING), true, FIELD_TEXT},
     {"offset", IN(offset), 0, BIT(IWN_CMD_RECORDING), false, FIELD_INTEGER},
+    {"on", IN(on), 0, BIT(IWN_CMD_RECORD), true, FIELD_FLAG},
     {"key", IN(key), IWN_KEY_MAX, BIT(IWN_CMD_CONFIG), false, FIELD_TEXT},
     {"commit", IN(commit), 0, BIT(IWN_CMD_CONFIG), false, FIELD_FLAG},
 };

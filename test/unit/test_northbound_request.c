@@ -339,6 +339,17 @@ TEST(test_request_texts_with_terminal_controls_are_refused) {
     }
 }
 
+TEST(test_request_record_is_on_or_off) {
+    accepted("{\"cmd\":\"record\",\"on\":true}", IWN_CMD_RECORD);
+    TEST_ASSERT_TRUE(request.on);
+    accepted("{\"cmd\":\"record\",\"on\":false}", IWN_CMD_RECORD);
+    TEST_ASSERT_FALSE(request.on);
+    refused(IWN_MISSING_FIELD, "{\"cmd\":\"record\"}");
+    refused(IWN_BAD_VALUE, "{\"cmd\":\"record\",\"on\":1}");
+    refused(IWN_UNKNOWN_FIELD, "{\"cmd\":\"record\",\"on\":true,\"name\":\"x\"}");
+    refused(IWN_UNKNOWN_FIELD, "{\"cmd\":\"recordings\",\"on\":true}");
+}
+
 TEST(test_request_config_reads_stages_or_commits) {
     accepted("{\"cmd\":\"config\"}", IWN_CMD_CONFIG);
     TEST_ASSERT_EQUAL_STRING("", request.key);

@@ -12,7 +12,8 @@ function confirmed(text, yes) {
   $("ask-says").textContent = text;
   $("ask-yes").textContent = yes;
   if (!dialog.open) dialog.show();
-  $("ask-no").focus();
+  $("ask-no").focus({ preventScroll: true });
+  dialog.scrollTop = 0; // In large text the question is longer than the screen: it is read first.
   return new Promise((done) => {
     $("ask-yes").onclick = () => { done(true); dialog.close(); };
     $("ask-no").onclick = () => dialog.close();
