@@ -797,7 +797,7 @@ class Bringup(unittest.TestCase):
         operator.answer("Watch the left wheel", "q")
         operator.answer("Save the 2 confirmed results", "")
         self.assertEqual(1, operator.wait())
-        self.assertIn("--from " + self.out + ".part", "".join(operator.text.split("\n")))
+        self.assertIn(f"  iwheelctl bringup {self.out} --from {self.out}.part\n", operator.text)
         self.assertFalse(os.path.exists(self.out))
         return self.out + ".part"
 

@@ -1,13 +1,17 @@
 # SPDX-License-Identifier: MIT
 """iwheelctl export: other programs' libraries read back what it writes. The golden recording ends with a pressed e-stop. Needs no gateway."""
 
+import fcntl
 import json
 import os
+import pty
 import re
 import shutil
+import struct
 import subprocess
 import sys
 import tempfile
+import termios
 import unittest
 
 import pytest
@@ -199,6 +203,21 @@ class Export(unittest.TestCase):
         self.export(path, "csv", "--interface", "can0")
         blf = self.export(path, "blf", "--interface", "can1")
         self.assertEqual(len(list(can.BLFReader(blf))), 4)
+
+    def test_long_recording_shows_its_progress_on_a_terminal(self):
+        path = self.write("long.log", "".join(f"({n // 1000}.{n % 1000:03}000) can0 100#00130000 R\n" for n in range(200_000)))
+        self.environment["TERM"] = "xterm"
+        for to in ("csv", "blf"):
+            parent, child = pty.openpty()
+            fcntl.ioctl(child, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 80, 0, 0))
+            subprocess.run([PROGRAM, "export", path, "--to", to], cwd=self.folder, env=self.environment, stderr=child, timeout=60, check=True)
+            os.close(child)
+            said = os.read(parent, 65536).decode()
+            os.close(parent)
+            shown = [int(share) for share in re.findall(r"\r *(\d+) %\r", said)]
+            self.assertGreaterEqual(len(shown), 3, said)
+            self.assertEqual(shown, sorted(shown))
+            self.assertGreater(shown[-1], 90)
 
 
 class Convert(unittest.TestCase):

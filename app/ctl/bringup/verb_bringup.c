@@ -118,7 +118,8 @@ _Noreturn static void end_with_offer(bringup_t *self) {
     if (count == 0U || !talk_yes(self, question, true) || !bringup_write_file(self, path, true)) {
         bringup_abandon(self);
     }
-    talk_say("Saved. To continue: iwheelctl bringup %s --from %s", self->out_path, path);
+    talk_say("Saved. To continue:");
+    (void)printf("  iwheelctl bringup %s --from %s\n", self->out_path, path);
     end(self, "Ended. The configuration is not complete, and was not written.");
 }
 

@@ -36,8 +36,8 @@ typedef struct {
     uint64_t cut_us; ///< Later times are earlier by this.
     iw_time_us_t group_us;
     bool group; ///< Frames wait for their step.
-    uint64_t backwards;
     bool samples;
+    uint64_t backwards;
     int64_t size; ///< Size of the file in bytes; 0: unknown.
 } verb_replay_t;
 
