@@ -142,7 +142,7 @@ void gw_record_rolling(gw_box_t *box, sock_log_t *log, const iw_snapshot_t *seen
     }
 }
 
-static void tell_result(const gw_box_t *box, sock_log_t *log) {
+static void report_result(const gw_box_t *box, sock_log_t *log) {
     const gw_box_result_t *result = &box->last;
     const char *directory = box->config.directory;
     if (result->number == 0U && result->error == 0) {
@@ -166,7 +166,7 @@ static void tell_result(const gw_box_t *box, sock_log_t *log) {
 void gw_record_take(gw_box_t *box, sock_log_t *log) {
     switch (gw_box_take(box)) {
     case GW_CHILD_SAID:
-        tell_result(box, log);
+        report_result(box, log);
         break;
     case GW_CHILD_ENDED:
         sock_log(
