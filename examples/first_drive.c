@@ -16,13 +16,13 @@ bool first_drive_init(iw_gateway_t *gateway, const iw_hal_t *hal, iw_time_us_t n
     return iw_gateway_init(gateway, &config, hal, now_us, restarted) == IW_CONFIG_OK;
 }
 
-void first_drive_command(iw_gateway_t *gateway, iw_time_us_t now_us) {
+iw_refusal_t first_drive_command(iw_gateway_t *gateway, iw_time_us_t now_us) {
     static bool was_armed; // After a stop the program does not arm again: a person must start it.
     const iw_drive_t forward = {.speed_mm_s = {200, 200}};
     iw_applied_t applied;
     const bool is_armed = iw_gateway_state(gateway) == IW_STATE_ARMED;
     if (now_us < ARM_AT_us || (was_armed && !is_armed)) {
-        return;
+        return IW_REFUSE_NONE;
     }
     was_armed = is_armed;
     if (now_us >= STOP_AT_us) {
@@ -30,8 +30,9 @@ void first_drive_command(iw_gateway_t *gateway, iw_time_us_t now_us) {
             iw_gateway_stop(gateway, now_us, CLIENT, IW_CAUSE_CLIENT_STOP);
         }
     } else if (iw_gateway_state(gateway) == IW_STATE_LISTENING && !iw_gateway_arming(gateway)) {
-        (void)iw_gateway_arm(gateway, now_us, CLIENT, false); // If it is refused, the next step tries again.
+        return iw_gateway_arm(gateway, now_us, CLIENT, false); // If it is refused, the next step tries again.
     } else if (is_armed) {
-        (void)iw_gateway_drive(gateway, now_us, CLIENT, &forward, &applied); // Extends the lease.
+        return iw_gateway_drive(gateway, now_us, CLIENT, &forward, &applied); // Extends the lease.
     }
+    return IW_REFUSE_NONE;
 }

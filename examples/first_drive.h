@@ -9,7 +9,8 @@
 /// the configuration is not valid; then do not continue.
 bool first_drive_init(iw_gateway_t *gateway, const iw_hal_t *hal, iw_time_us_t now_us, bool restarted);
 
-/// Arms, drives or stops, depending on the time. Call it before each step.
-void first_drive_command(iw_gateway_t *gateway, iw_time_us_t now_us);
+/// Arms, drives or stops, depending on the time. Call it before each step. Returns why the core refused it; see
+/// `iw_refusal_text`.
+iw_refusal_t first_drive_command(iw_gateway_t *gateway, iw_time_us_t now_us);
 
 #endif

@@ -96,7 +96,13 @@ class Types:
             self.define_object(name)
 
     def define_object(self, name):
-        holder = self.description.objects[name]
+        self.define_class(name, camel(name), self.description.objects[name])
+
+    def define_event(self, name):
+        """Adds the type of an event; its field `event` is its name, so that mypy knows the fields of the others."""
+        self.define_class(f"{name}_event", f"{camel(name)}Event", self.description.events[name], event=name)
+
+    def define_class(self, name, title, holder, event=None):
         for field in self.description.fields(holder).values():
             for kind in [*(field["type"] if isinstance(field["type"], list) else [field["type"]]), field.get("keys", "text")]:
                 self.define(kind)
@@ -106,9 +112,13 @@ class Types:
         own = dict(holder["fields"])
         base = self.set_apart(name, base, "Named", {key: own.pop(key) for key in list(own) if keyword.iskeyword(key)})
         base = self.set_apart(name, base, "Partly", {key: own.pop(key) for key in list(own) if own[key].get("optional")})
-        lines = [f"class {camel(name)}({base}):"]
-        if holder.get("what"):
+        lines = [f"class {title}({base}):"]
+        if event is not None:
+            lines += [docstring({"what": f"The event `{event}`: {holder['what']}"}), ""]
+        elif holder.get("what"):
             lines += [docstring(holder), ""]
+        if event is not None:
+            lines.append(f"    event: Literal[{json.dumps(event)}]")
         for key, field in own.items():
             lines.append(f"    {key}: {self.type_of(field)}")
             if field.get("what"):
@@ -144,6 +154,8 @@ def wrapped(name, words):
 def python_types(description):
     replies = list(dict.fromkeys(request["reply"] for request in description.requests.values()))
     types = Types(description, [name for name in replies if name not in ("terms", "applied", "new_state")])
+    for event in description.events:
+        types.define_event(event)
     limits = description.limits
     constants = f"API = {description.api}\nREQUEST_MAX = {limits['request_bytes']}\nLINE_MAX = {limits['line_bytes']}"
     body = "\n\n".join([constants, *types.blocks])

@@ -5,7 +5,7 @@
 usage: sizes.py --update|--check M0PLUS_BUILD_DIR M3_BUILD_DIR M4_BUILD_DIR
 
 A number may differ from the committed one by 2 % or 8 bytes, whichever is more. The linked code of each use must fit the limit in USES. The images are
-those of the presets arm-m3 and arm, which listen, of the build next to arm that ends in -f446, and of the builds next to these that end in -demo and
+those of the presets arm-m3 and arm, which listen, of the builds next to arm that end in -f446 and -g474, and of the builds next to these that end in -demo and
 -gateway. Their stack: an interrupt can occur anywhere, and no interrupt interrupts another, so the worst handler and the registers that the CPU saves
 are added to the main loop's deepest path; calls through the HAL go to each of its functions. For an image that is optimised as one program, the graph
 is that of the linker's result and of the objects outside it.
@@ -47,9 +47,15 @@ USES = {
 }
 SECTION = re.compile(r"^ \.(?:text|rodata)\S*\s+0x[0-9a-f]+\s+0x([0-9a-f]+) \S*libiwheel_core\.a\((\w+)\.c\S*\)$", re.MULTILINE)
 # Image, its build, and the ending of that build's name.
-BOARDS = {"STM32F103": ("iwheel_stm32f103", 1, ""), "STM32F407": ("iwheel_stm32f407", 2, ""), "STM32F446": ("iwheel_stm32f446", 2, "-f446")}
-HAL = ("brd_bxcan_send", "brd_bxcan_receive", "brd_bxcan_bus_state", "brd_bxcan_purge", "brd_estop_pressed")
-HANDLERS = ("brd_systick_handler", "brd_exti0_handler", "brd_can_transmit_handler", "brd_can_receive_handler", "brd_can_error_handler")
+BOARDS = {
+    "STM32F103": ("iwheel_stm32f103", 1, ""),
+    "STM32F407": ("iwheel_stm32f407", 2, ""),
+    "STM32F446": ("iwheel_stm32f446", 2, "-f446"),
+    "STM32G474": ("iwheel_stm32g474", 2, "-g474"),
+}
+BUS = ("send", "receive", "bus_state", "purge")
+HANDLERS = ("brd_systick_handler", "brd_exti0_handler")
+CAN_HANDLERS = {"bxcan": ("brd_can_transmit_handler", "brd_can_receive_handler", "brd_can_error_handler"), "fdcan": ("brd_can_handler",)}
 # Only for the image gateway: names of the functions that northbound's refusals call through a table.
 SERIAL_HANDLERS, THROUGH_TABLE = ("brd_serial_usart_handler", "brd_serial_receive_handler", "brd_serial_transmit_handler"), ":say_"
 SAVED_BY_CPU = 36  # Eight registers and four bytes to align them.
@@ -138,12 +144,14 @@ def linked_objects(build, image):
 def image_stack(build, image):
     objects = linked_objects(build, image)
     known = read_graph(objects)[0]
-    hal = [name for name in known if short(name) in HAL]
+    controller = "fdcan" if "stm32g4" in image else "bxcan"
+    bus = (*(f"brd_{controller}_{name}" for name in BUS), "brd_estop_pressed")
+    hal = [name for name in known if short(name) in bus]
     serial = [name for name in SERIAL_HANDLERS if name in known]
     tabled = [name for name in known if THROUGH_TABLE in name and serial]
     _, depth = depth_of(objects, (*hal, *tabled))
-    handlers = (*HANDLERS, *serial)
-    missing = {*HAL, *HANDLERS} - {*map(short, hal), *known}
+    handlers = (*HANDLERS, *CAN_HANDLERS[controller], *serial)
+    missing = {*bus, *handlers} - {*map(short, hal), *known}
     if missing:
         raise SystemExit(f"not in the call graph of {image}: {', '.join(missing)}")
     total = depth.of("main")[0] + SAVED_BY_CPU + max(depth.of(name)[0] for name in handlers)

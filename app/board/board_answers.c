@@ -6,6 +6,8 @@
 
 #include <string.h>
 
+#define NOT_HERE "this gateway is a microcontroller and has no "
+
 iwn_client_t *iwn_target_next(iwn_server_t *server, const iwn_client_t *after) {
     brd_host_t *const self = brd_host_of(server);
     size_t next = (after == NULL) ? 0U : (size_t)((const brd_host_client_t *)after - self->client) + 1U;
@@ -62,8 +64,7 @@ void iwn_target_say_right(iwn_server_t *server) {
 bool iwn_target_is_key(iwn_server_t *server, const iwn_client_t *client, const char *key) {
     (void)client;
     (void)key;
-    return IWN_REFUSE(&server->refusal, IWN_NOT_HOLDER,
-                      "this gateway is a microcontroller and has no key; leave key out");
+    return IWN_REFUSE(&server->refusal, IWN_NOT_HOLDER, NOT_HERE, "key; leave key out");
 }
 
 /// Returns the defect of a quote, or NULL if there is none. A stamp from before the channel was opened belongs to
@@ -154,7 +155,7 @@ void iwn_target_other(iwn_server_t *server, iwn_client_t *client) {
         brd_host_config(brd_host_of(server), client);
         break;
     default:
-        (void)IWN_REFUSE(&server->refusal, IWN_DENIED, "this gateway is a microcontroller and has no recordings");
+        (void)IWN_REFUSE(&server->refusal, IWN_DENIED, NOT_HERE, "recordings");
         iwn_server_refuse(server, client, &server->request.id);
         break;
     }

@@ -8,18 +8,32 @@
 /// Largest raw force that is not saturated (32766 cN), in mN: no offset of a wheel exceeds it.
 #define ZERO_MAX_mN 327660
 
-const char *brd_assumptions_key(iw_assumption_item_t item) {
-    static const char *const keys[IW_ASSUMPTION_ITEMS] = {
-        [IW_ASSUMPTION_SETPOINT_TYPE] = "wheels.setpoint_type", [IW_ASSUMPTION_CURRENT_ROLE] = "wheels.current_role",
-        [IW_ASSUMPTION_FORCE_UNIT_LEFT] = "left.force_unit",    [IW_ASSUMPTION_FORCE_UNIT_RIGHT] = "right.force_unit",
-        [IW_ASSUMPTION_MOUNT_SIGN_LEFT] = "left.invert",        [IW_ASSUMPTION_MOUNT_SIGN_RIGHT] = "right.invert",
-        [IW_ASSUMPTION_WHEEL_RADIUS] = "wheels.radius_mm",      [IW_ASSUMPTION_TRACK] = "wheels.track_mm",
-        [IW_ASSUMPTION_GEAR_RATIO] = "wheels.gear_ratio",
-    };
-    return keys[item];
+brd_key_t brd_assumptions_key(iw_assumption_item_t item) {
+    switch (item) {
+    case IW_ASSUMPTION_SETPOINT_TYPE:
+        return BRD_KEY_SETPOINT_TYPE;
+    case IW_ASSUMPTION_CURRENT_ROLE:
+        return BRD_KEY_CURRENT_ROLE;
+    case IW_ASSUMPTION_FORCE_UNIT_LEFT:
+        return BRD_KEY_UNIT_LEFT;
+    case IW_ASSUMPTION_FORCE_UNIT_RIGHT:
+        return BRD_KEY_UNIT_RIGHT;
+    case IW_ASSUMPTION_MOUNT_SIGN_LEFT:
+        return BRD_KEY_INVERT_LEFT;
+    case IW_ASSUMPTION_MOUNT_SIGN_RIGHT:
+        return BRD_KEY_INVERT_RIGHT;
+    case IW_ASSUMPTION_WHEEL_RADIUS:
+        return BRD_KEY_RADIUS;
+    case IW_ASSUMPTION_TRACK:
+        return BRD_KEY_TRACK;
+    case IW_ASSUMPTION_GEAR_RATIO:
+        return BRD_KEY_GEAR_RATIO;
+    default:
+        return BRD_KEY_NONE;
+    }
 }
 
-static bool has_value(const char *key, const brd_settings_t *one, const brd_settings_t *other) {
+static bool has_value(brd_key_t key, const brd_settings_t *one, const brd_settings_t *other) {
     char value[BRD_SETTINGS_TEXT];
     char wanted[BRD_SETTINGS_TEXT];
     return brd_settings_value(one, key, value) && brd_settings_value(other, key, wanted) && strcmp(value, wanted) == 0;
@@ -27,9 +41,9 @@ static bool has_value(const char *key, const brd_settings_t *one, const brd_sett
 
 /// Returns true if both settings have the same value of the item. Facts that were found for another value do not apply.
 static bool is_for(iw_assumption_item_t item, const brd_settings_t *found, const brd_settings_t *now) {
-    const char *const key = brd_assumptions_key(item);
-    return (key == NULL || has_value(key, found, now)) &&
-           (item != IW_ASSUMPTION_GEAR_RATIO || has_value("wheels.rpm_of", found, now));
+    const brd_key_t key = brd_assumptions_key(item);
+    return (key == BRD_KEY_NONE || has_value(key, found, now)) &&
+           (key != BRD_KEY_GEAR_RATIO || has_value(BRD_KEY_RPM_OF, found, now));
 }
 
 static iw_assumption_item_t unit_of(unsigned side) {

@@ -49,7 +49,7 @@ void brd_assumptions_restore(const brd_assumptions_t *self, const brd_settings_t
 /// Returns true if `now` contains more facts than `stored`, or other ones.
 bool brd_assumptions_differs(const brd_assumptions_t *now, const brd_assumptions_t *stored);
 
-/// Returns the configuration key of an item; NULL: it has no key, and its value is "yes".
-const char *brd_assumptions_key(iw_assumption_item_t item);
+/// Returns the configuration key of an item; BRD_KEY_NONE: its value is "yes".
+brd_key_t brd_assumptions_key(iw_assumption_item_t item);
 
 #endif

@@ -12,6 +12,8 @@ typedef union {
         brd_settings_t settings;
         uint32_t has_learned;
         brd_assumptions_t learned;
+        brd_fault_t fault;
+        uint32_t fault_at; ///< Value of power_ons at that fault.
     } is;
     uint32_t words[BRD_STORE_WORDS];
 } record_t;
@@ -56,14 +58,23 @@ static void read(const brd_records_t *self, record_t *out_record) {
     }
 }
 
-void brd_records_open(brd_records_t *self, bool power_on, bool is_urgent) {
+/// Writes only the first fault after each power-on, so that a board that faults again and again does not wear out the
+/// flash.
+void brd_records_open(brd_records_t *self, bool power_on, bool is_urgent, brd_fault_t fault) {
     record_t record;
     brd_store_open(&self->store);
     read(self, &record);
     record.is.power_ons += power_on ? 1U : 0U;
     self->power_ons = record.is.power_ons;
     const bool is_short = brd_store_blank(&self->store) < ROOM_LEAST;
-    const bool is_due = power_on || (is_short && !is_urgent);
+    const bool is_first = fault.cause != 0U && record.is.fault_at != self->power_ons;
+    if (is_first) {
+        record.is.fault = fault;
+        record.is.fault_at = self->power_ons;
+    }
+    const bool is_recent = record.is.fault_at + 1U >= self->power_ons;
+    self->fault = (fault.cause != 0U || !is_recent) ? fault : record.is.fault;
+    const bool is_due = power_on || is_first || (is_short && !is_urgent);
     if (is_due && !brd_store_write(&self->store, record.words, !is_urgent) && power_on) {
         self->power_ons = 0;
     }

@@ -42,17 +42,17 @@ typedef struct {
 } row_t;
 
 static const row_t rows[] = {
-    {"setpoint_type", S_WHEELS, TYPE, BYTE, W_NONE},
-    {"current_role", S_WHEELS, ROLE, WORDS, W_ROLE},
-    {"rpm_of", S_WHEELS, RPM_OF, SWITCH, W_TURNS},
-    {"radius_mm", S_WHEELS, INDEX(RADIUS), NUMBER, W_NONE},
-    {"gear_ratio", S_WHEELS, INDEX(GEAR_TURNS), GEAR, W_NONE},
-    {"track_mm", S_WHEELS, INDEX(TRACK), NUMBER, W_NONE},
-    {"setpoint_dlc", S_WHEELS, INDEX(SETPOINT_DLC), NUMBER, W_NONE},
-    {"invert", S_LEFT, INVERT_LEFT, SWITCH, W_YES},
-    {"force_unit", S_LEFT, UNIT_LEFT, SWITCH, W_UNIT},
-    {"invert", S_RIGHT, INVERT_RIGHT, SWITCH, W_YES},
-    {"force_unit", S_RIGHT, UNIT_RIGHT, SWITCH, W_UNIT},
+    [BRD_KEY_SETPOINT_TYPE] = {"setpoint_type", S_WHEELS, TYPE, BYTE, W_NONE},
+    [BRD_KEY_CURRENT_ROLE] = {"current_role", S_WHEELS, ROLE, WORDS, W_ROLE},
+    [BRD_KEY_RPM_OF] = {"rpm_of", S_WHEELS, RPM_OF, SWITCH, W_TURNS},
+    [BRD_KEY_RADIUS] = {"radius_mm", S_WHEELS, INDEX(RADIUS), NUMBER, W_NONE},
+    [BRD_KEY_GEAR_RATIO] = {"gear_ratio", S_WHEELS, INDEX(GEAR_TURNS), GEAR, W_NONE},
+    [BRD_KEY_TRACK] = {"track_mm", S_WHEELS, INDEX(TRACK), NUMBER, W_NONE},
+    [BRD_KEY_SETPOINT_DLC] = {"setpoint_dlc", S_WHEELS, INDEX(SETPOINT_DLC), NUMBER, W_NONE},
+    [BRD_KEY_INVERT_LEFT] = {"invert", S_LEFT, INVERT_LEFT, SWITCH, W_YES},
+    [BRD_KEY_UNIT_LEFT] = {"force_unit", S_LEFT, UNIT_LEFT, SWITCH, W_UNIT},
+    [BRD_KEY_INVERT_RIGHT] = {"invert", S_RIGHT, INVERT_RIGHT, SWITCH, W_YES},
+    [BRD_KEY_UNIT_RIGHT] = {"force_unit", S_RIGHT, UNIT_RIGHT, SWITCH, W_UNIT},
     {"period_ms", S_DRIVE, INDEX(PERIOD), NUMBER, W_NONE},
     {"lease_ms", S_DRIVE, INDEX(LEASE), NUMBER, W_NONE},
     {"accel_mm_s2", S_DRIVE, INDEX(ACCEL), NUMBER, W_NONE},
@@ -178,10 +178,14 @@ static bool within(uint32_t number, iw_config_range_t range) {
     return number >= range.min && number <= range.max;
 }
 
+static void add_key(const row_t *row, iwn_text_t *text) {
+    IWN_TEXT_JOIN(text, section_of(row), ".", row->key);
+}
+
 static bool refuse_number(const row_t *row, iwn_text_t *why) {
     const iw_config_range_t range = range_of(row);
-    IWN_TEXT_JOIN(why, section_of(row), ".", row->key,
-                  (row->kind == GEAR) ? " must be N or N/M, each of " : " must be ");
+    add_key(row, why);
+    iwn_text_add(why, (row->kind == GEAR) ? " must be N or N/M, each of " : " must be ");
     iwn_text_int(why, range.min);
     iwn_text_add(why, " to ");
     iwn_text_int(why, range.max);
@@ -213,12 +217,7 @@ static void set_word(brd_settings_t *self, const row_t *row, unsigned word) {
     }
 }
 
-bool brd_settings_set(brd_settings_t *self, const char *key, const char *value, iwn_text_t *why) {
-    const row_t *const row = find(key);
-    if (row == NULL) {
-        IWN_TEXT_JOIN(why, key, " is no key of a board; use keys of wheels, left, right, drive, limits");
-        return false;
-    }
+static bool set(brd_settings_t *self, const row_t *row, const char *value, iwn_text_t *why) {
     if (row->kind < WORDS) {
         return set_number(self, row, value, why);
     }
@@ -228,8 +227,22 @@ bool brd_settings_set(brd_settings_t *self, const char *key, const char *value, 
             return true;
         }
     }
-    IWN_TEXT_JOIN(why, key, " must be ", words[row->words][0], " or ", words[row->words][1]);
+    add_key(row, why);
+    IWN_TEXT_JOIN(why, " must be ", words[row->words][0], " or ", words[row->words][1]);
     return false;
+}
+
+bool brd_settings_set(brd_settings_t *self, const char *key, const char *value, iwn_text_t *why) {
+    const row_t *const row = find(key);
+    if (row == NULL) {
+        IWN_TEXT_JOIN(why, key, " is no key of a board; use keys of wheels, left, right, drive, limits");
+        return false;
+    }
+    return set(self, row, value, why);
+}
+
+bool brd_settings_set_key(brd_settings_t *self, brd_key_t key, const char *value, iwn_text_t *why) {
+    return set(self, &rows[key], value, why);
 }
 
 bool brd_settings_check(const brd_settings_t *self, iwn_text_t *why) {
@@ -281,9 +294,8 @@ static bool value_of(const brd_settings_t *self, const row_t *row, char out_text
     return within(value, range_of(row)); // False for an unset type, and for a track of 0.
 }
 
-bool brd_settings_value(const brd_settings_t *self, const char *key, char out_text[BRD_SETTINGS_TEXT]) {
-    const row_t *const row = find(key);
-    return row != NULL && value_of(self, row, out_text);
+bool brd_settings_value(const brd_settings_t *self, brd_key_t key, char out_text[BRD_SETTINGS_TEXT]) {
+    return value_of(self, &rows[key], out_text);
 }
 
 void brd_settings_write(const brd_settings_t *self, iwn_out_t *json) {
@@ -292,7 +304,7 @@ void brd_settings_write(const brd_settings_t *self, iwn_out_t *json) {
     iwn_out_open(json, "keys", '[');
     for (size_t i = 0; i < ROWS; i++) {
         iwn_text_t key = iwn_text_begin(name, sizeof name);
-        IWN_TEXT_JOIN(&key, section_of(&rows[i]), ".", rows[i].key);
+        add_key(&rows[i], &key);
         iwn_out_open(json, NULL, '{');
         iwn_out_text(json, "key", name);
         iwn_out_text(json, "value", value_of(self, &rows[i], value) ? value : NULL);

@@ -19,6 +19,22 @@ typedef struct {
     uint16_t value[BRD_SETTINGS];
 } brd_settings_t;
 
+/// Keys of the sections wheels, left and right. Assumptions are about their values.
+typedef enum {
+    BRD_KEY_SETPOINT_TYPE = 0,
+    BRD_KEY_CURRENT_ROLE,
+    BRD_KEY_RPM_OF,
+    BRD_KEY_RADIUS,
+    BRD_KEY_GEAR_RATIO,
+    BRD_KEY_TRACK,
+    BRD_KEY_SETPOINT_DLC,
+    BRD_KEY_INVERT_LEFT,
+    BRD_KEY_UNIT_LEFT,
+    BRD_KEY_INVERT_RIGHT,
+    BRD_KEY_UNIT_RIGHT,
+    BRD_KEY_NONE,
+} brd_key_t;
+
 brd_settings_t brd_settings_from(const iw_config_t *config);
 
 /// Converts the values of version 0.2. Keys that were added later get their defaults.
@@ -30,10 +46,11 @@ void brd_settings_to(const brd_settings_t *self, iw_config_t *config);
 /// Sets one key. Returns false, changes nothing and writes reason and fix to `why` if the key does not exist or cannot
 /// have that value.
 bool brd_settings_set(brd_settings_t *self, const char *key, const char *value, iwn_text_t *why);
+bool brd_settings_set_key(brd_settings_t *self, brd_key_t key, const char *value, iwn_text_t *why);
 
-/// Writes the value in the form of the configuration file. Returns false if the key does not exist or is not set.
+/// Writes the value in the form of the configuration file. Returns false if the key is not set.
 #define BRD_SETTINGS_TEXT 16U
-bool brd_settings_value(const brd_settings_t *self, const char *key, char out_text[BRD_SETTINGS_TEXT]);
+bool brd_settings_value(const brd_settings_t *self, brd_key_t key, char out_text[BRD_SETTINGS_TEXT]);
 
 /// Checks the relations between keys. Returns false, and writes reason and fix to `why`, if one does not hold.
 bool brd_settings_check(const brd_settings_t *self, iwn_text_t *why);

@@ -36,7 +36,7 @@ bool brd_commander_sends(void) {
 /// The identifier of this start depends on the counter of power-ons, so the counter is written before the identifier is
 /// sent. RAM stores the number of starts since then.
 void brd_commander_open(bool power_on, bool in_motion) {
-    brd_records_open(&records, power_on, in_motion);
+    brd_records_open(&records, power_on, in_motion, brd_fault_take());
 }
 
 void brd_commander_configure(iw_config_t *config) {
@@ -73,6 +73,7 @@ static void begin(iw_gateway_t *gateway, iw_time_us_t now_us) {
         .settings = brd_settings_from(brd_report_room()->config),
         .rate_max_hz = RATE_MAX_HZ,
         .boot = brd_boot_id(records.power_ons),
+        .last_fault = records.fault,
     };
     brd_host_init(&host, &place, now_us);
     is_begun = true;

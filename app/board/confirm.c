@@ -34,14 +34,14 @@ static bool is_same(iw_assumption_item_t item, const brd_settings_t *found, cons
 /// cannot have that value.
 static bool compare(brd_host_t *self, bool *out_same) {
     const iwn_request_t *const request = &self->server.request;
-    const char *const key = brd_assumptions_key(request->item);
+    const brd_key_t key = brd_assumptions_key(request->item);
     const bool has_value = request->value[0] != '\0';
     char value[BRD_SETTINGS_TEXT];
     brd_settings_t found = self->settings;
     iwn_text_t why = iwn_text_begin(self->server.refusal.message, sizeof self->server.refusal.message);
     *out_same = true;
     self->server.refusal.error = IWN_BAD_VALUE;
-    if (key == NULL) {
+    if (key == BRD_KEY_NONE) {
         *out_same = !has_value || strcmp(request->value, "yes") == 0;
         return *out_same || strcmp(request->value, "no") == 0 ||
                IWN_REFUSE(&self->server.refusal, IWN_BAD_VALUE, "value must be yes or no; leave it out to confirm it");
@@ -51,7 +51,7 @@ static bool compare(brd_host_t *self, bool *out_same) {
                           (request->item == IW_ASSUMPTION_TRACK) ? IWN_TRACK_NOT_SET : IWN_TYPE_NOT_SET,
                           "it is not configured, so there is nothing to confirm; set it by the request config first");
     }
-    if (has_value && !brd_settings_set(&found, key, request->value, &why)) {
+    if (has_value && !brd_settings_set_key(&found, key, request->value, &why)) {
         return false;
     }
     *out_same = is_same(request->item, &found, &self->settings);
@@ -60,14 +60,14 @@ static bool compare(brd_host_t *self, bool *out_same) {
 
 void brd_host_write_item(brd_host_t *self, iw_assumption_item_t item, iwn_out_t *json) {
     const iw_assumption_entry_t *const entry = &iwn_server_look(&self->server)->assumed[item];
-    const char *const key = brd_assumptions_key(item);
+    const brd_key_t key = brd_assumptions_key(item);
     char plain[BRD_SETTINGS_TEXT] = "yes";
     char whose[BRD_SETTINGS_TEXT];
     char value[2U * BRD_SETTINGS_TEXT + 16U];
     iwn_text_t text = iwn_text_begin(value, sizeof value);
-    const bool is_set = key == NULL || brd_settings_value(&self->settings, key, plain);
+    const bool is_set = key == BRD_KEY_NONE || brd_settings_value(&self->settings, key, plain);
     iwn_text_add(&text, plain);
-    if (item == IW_ASSUMPTION_GEAR_RATIO && brd_settings_value(&self->settings, "wheels.rpm_of", whose)) {
+    if (key == BRD_KEY_GEAR_RATIO && brd_settings_value(&self->settings, BRD_KEY_RPM_OF, whose)) {
         IWN_TEXT_JOIN(&text, ", rpm of the ", whose); // As the daemon writes it.
     }
     iwn_out_text(json, "item", iwn_assumption_item_name(item));

@@ -132,7 +132,7 @@ static void take_line(brd_host_t *self, const iwn_line_t *line) {
 }
 
 /// Restores the learned facts before the wheels are online. The measurements of this run have priority.
-static void recall(brd_host_t *self) {
+static void restore_assumptions(brd_host_t *self) {
     brd_assumptions_t learned;
     if (brd_host_read_assumptions(&learned)) {
         brd_assumptions_restore(&learned, &self->settings, self->server.core, self->zero);
@@ -181,6 +181,7 @@ void brd_host_init(brd_host_t *self, const brd_host_place_t *place, iw_time_us_t
     self->bitrate_hz = place->bitrate_hz;
     self->sample_point_permille = place->sample_point_permille;
     self->boot = place->boot;
+    self->last_fault = place->last_fault;
     self->received_us = now_us;
     self->linked_us = now_us;
     iw_config_t config;
@@ -190,7 +191,7 @@ void brd_host_init(brd_host_t *self, const brd_host_place_t *place, iw_time_us_t
     self->staged = place->settings;
     iwn_receiver_init(&self->receiver, self->in, sizeof self->in, false);
     iwn_server_begin(server);
-    recall(self);
+    restore_assumptions(self);
     brd_host_report_link(self);
 }
 

@@ -18,6 +18,7 @@
 #define BRD_HOST_H
 
 #include "board_assumptions.h"
+#include "fault.h"
 #include "pending.h"
 
 #include "iwheel/gateway.h"
@@ -77,6 +78,7 @@ typedef struct {
     brd_settings_t settings; ///< Settings in force.
     uint32_t rate_max_hz;    ///< Highest rate of snapshots that the serial line carries in addition to replies.
     uint64_t boot;           ///< Identifier of this start; every start has another one.
+    brd_fault_t last_fault;  ///< Fault that ended an earlier run; cause 0: none.
 } brd_host_place_t;
 
 /// Small members come first, as in the server.
@@ -89,6 +91,7 @@ typedef struct {
     iw_time_us_t error_us;    ///< Time of the last line_error.
     iw_time_us_t learn_us;    ///< Earliest time at which learned facts are written.
     iw_time_us_t restart_us;  ///< Latest time of the restart after a commit; 0: no restart.
+    brd_fault_t last_fault;   ///< As in brd_host_place_t.
     uint32_t errors;          ///< Bad lines since the start.
     uint32_t errors_told;     ///< Bad lines that a line_error has counted.
     uint32_t bitrate_hz;      ///< Bit rate of the bus.

@@ -139,6 +139,9 @@ void brd_host_report_link(brd_host_t *self) {
     iwn_out_text(&json, "version", self->server.version);
     IWN_OUT_NUMBERS(&json, "line_bytes\0channels\0silent_ms\0", BRD_HOST_LINE_BYTES, IWN_LINE_CHANNELS,
                     IWN_LINE_SILENT_MS);
+    if (self->last_fault.cause != 0U) {
+        IWN_OUT_NUMBERS(&json, "fault_cause\0fault_pc\0", self->last_fault.cause, self->last_fault.pc);
+    }
     if (put(self, CHANNEL_LINK, finish(&json), 0U)) {
         self->linked_us = self->server.now_us;
     }

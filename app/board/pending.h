@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 /// Ids of requests whose replies wait: an arm for its TX confirmation, a status for the long line. All clients share
-/// one pool, because an id needs 88 bytes, and more than one arm rarely waits.
+/// one pool, because an id needs 80 bytes, and more than one arm rarely waits.
 ///
 /// Pure, no heap. All zero: no reply waits.
 #ifndef BRD_PENDING_H

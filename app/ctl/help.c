@@ -62,6 +62,7 @@ static const verb_t verbs[] = {
     {VERB(decode, verb_decode)},
     {VERB(learn, verb_learn)},
     {VERB(replay, verb_replay)},
+    {VERB(export, verb_export), .no_json = "export writes a file; for JSON lines: iwheelctl --json decode FILE"},
     {VERB(help, verb_help), .no_json = "help is text for people; it has no --json", .choice = verb_choice},
 };
 #define VERBS (sizeof verbs / sizeof verbs[0])

@@ -15,6 +15,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent.parent
 sys.path.insert(0, str(ROOT / "test/system"))
 
+from ends import end_with_signals, other_terminal, require_free
 from harness import Process, Rig, find_program
 
 # As in the other demonstrations: wide limits for a busy machine.
@@ -97,7 +98,8 @@ def main():
     parser.add_argument("--port", type=int, default=18830)
     parser.add_argument("--plain", action="store_true")
     options = parser.parse_args()
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
+    require_free([options.port, options.port + 1], "--fleet")
+    end_with_signals(interrupted=0)
     rigs, storage = [], ""
     try:
         for number in range(options.machines):
@@ -113,16 +115,13 @@ def main():
         again = " ".join([os.path.relpath(console[0]), *console[1:]])
         sim = os.path.relpath(find_program(options.build, "iwheel-sim"))
         print(
-            f"{options.machines} machines at the broker on port {options.port}. In another terminal:\n\n"
-            f"    {sim} --control {rigs[0].path('control')} estop press\n    {again} recording walker-1\n"
+            f"{options.machines} machines at the broker on port {options.port}. In another terminal, in this folder:\n\n"
+            f"{other_terminal(rigs[0])}\n    {sim} --control {rigs[0].path('control')} estop press\n    {again} recording walker-1\n"
             + (f"    {again} history --last 5min\n" if storage else ""),
             flush=True,
         )
         time.sleep(5)
         return subprocess.run(console, check=False).returncode
-    except KeyboardInterrupt:
-        print()
-        return 0
     finally:
         for rig in reversed(rigs):
             rig.close()

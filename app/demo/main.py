@@ -10,6 +10,7 @@ import os
 import sys
 
 from cast import Sleeper
+from ends import other_terminal
 from harness import Rig, find_program
 from screen import choose
 from story import TOTAL, Failed, Story
@@ -21,21 +22,15 @@ STALL_S, QUIET_S, AGAIN_S = 0.1, 0.005, 0.01
 
 def serve(rig):
     """Leaves all processes running and prints commands to try."""
-    tool = os.path.relpath(find_program(rig.build, "iwheelctl"))
     sim = os.path.relpath(find_program(rig.build, "iwheel-sim"))
     print(f"""
 Gateway and simulator continue to run. In another terminal, in this folder:
 
-    export IWHEEL_SOCKET={rig.path("gateway.sock")}
-    {tool} status
-    {tool} drive 300 300 --for 3s
-    {tool} watch state stop
-    {tool} why
-
+{other_terminal(rig)}
     SIM="{sim} --control {rig.path("control")}"
     $SIM estop press
     $SIM estop release
-    {tool} reset
+    {os.path.relpath(find_program(rig.build, "iwheelctl"))} reset
     $SIM help
 
 Configuration:      {rig.path("gateway.conf")}

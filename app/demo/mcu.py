@@ -6,7 +6,6 @@ import argparse
 import os
 import re
 import shutil
-import signal
 import subprocess
 import sys
 import tempfile
@@ -14,6 +13,10 @@ import time
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent.parent
+sys.path.insert(0, str(ROOT / "test/system"))
+
+from ends import end_with_signals
+
 BUILD_S, READY_S = 300, 30
 
 
@@ -93,7 +96,7 @@ def main():
     parser = argparse.ArgumentParser(prog="./demo --mcu")
     parser.add_argument("--build", required=True, type=Path)
     options = parser.parse_args()
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
+    end_with_signals()
     if shutil.which("arm-none-eabi-gcc") is None:
         sys.exit("demo: arm-none-eabi-gcc is missing; install it: scripts/install_tools mcu")
     with tempfile.TemporaryDirectory(prefix="iwheel-") as folder:
@@ -103,8 +106,6 @@ def main():
         except Failed as error:
             print(f"demo: {error}", file=sys.stderr)
             return 1
-        except KeyboardInterrupt:
-            return 130
         finally:
             story.end()
     return 0

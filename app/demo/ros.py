@@ -14,6 +14,7 @@ import time
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 sys.path[:0] = [os.path.join(ROOT, "test", part) for part in ("support", "system", "ros2")]
 
+from ends import end_with_signals
 from free_domain import free_domain
 from harness import Process, Rig
 from peer import Peer
@@ -137,6 +138,7 @@ def main():
     parser.add_argument("--build", required=True)
     parser.add_argument("--plain", action="store_true")
     options = parser.parse_args()
+    end_with_signals()
     domain = free_domain()
     rig = Rig(options.build, CONFIG)
     view = View(options.plain)
@@ -151,8 +153,6 @@ def main():
         return 0
     except (Failed, OSError, RuntimeError, TimeoutError) as error:
         print(f"\nFAILED: {error}", file=sys.stderr)
-        return 1
-    except KeyboardInterrupt:
         return 1
     finally:
         rig.close()

@@ -12,6 +12,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent.parent / "test/system"))
 
+from ends import end_with_signals, other_terminal, require_free
 from harness import Process, Rig, find_program
 
 # As in the other demonstrations: wide limits for a busy machine.
@@ -44,7 +45,8 @@ def main():
     parser.add_argument("--port", type=int, default=8470)
     parser.add_argument("--lan", action="store_true")
     options = parser.parse_args()
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
+    require_free([options.port], "--web")
+    end_with_signals(interrupted=0)
     rig = Rig(options.build, CONFIG)
     try:
         rig.start_gateway()
@@ -58,19 +60,19 @@ def main():
         print(
             f"""
 {phone}
-Faults, in another terminal:     {sim} --control {rig.path("control")} estop press
+In another terminal, in this folder:
+
+{other_terminal(rig)}
+Faults:                          {sim} --control {rig.path("control")} estop press
                                  {sim} --control {rig.path("control")} help
 
 Ctrl-C ends it.""",
             flush=True,
         )
         signal.pause()
-    except KeyboardInterrupt:
-        print()
     finally:
         rig.close()
-    return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

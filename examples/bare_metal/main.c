@@ -12,7 +12,7 @@ int main(void) {
     }
     for (;;) {
         const iw_time_us_t now_us = board_time_us();
-        first_drive_command(&gateway, now_us);
+        (void)first_drive_command(&gateway, now_us);
         const iw_time_us_t next_us = iw_gateway_step(&gateway, now_us);
         board_watchdog_feed();
         board_sleep_until(next_us);

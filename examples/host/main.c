@@ -14,9 +14,14 @@ int main(void) {
         return 1;
     }
     iw_state_t before = iw_gateway_state(&gateway);
+    iw_refusal_t refused = IW_REFUSE_NONE;
     for (iw_time_us_t now_us = 0; now_us < 5000000U; now_us += IW_US_PER_MS) {
         pretend_wheels_run(&wheels);
-        first_drive_command(&gateway, now_us);
+        const iw_refusal_t refusal = first_drive_command(&gateway, now_us);
+        if (refusal != IW_REFUSE_NONE && refusal != refused) {
+            (void)printf("%4u ms  refused: %s\n", (unsigned)(now_us / IW_US_PER_MS), iw_refusal_text(refusal));
+        }
+        refused = refusal;
         (void)iw_gateway_step(&gateway, now_us);
         const iw_state_t state = iw_gateway_state(&gateway);
         if (state != before) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Section numbers refer to RM0008 and RM0090: 7 reset and clock control. The bits used here mean the same in both.
+// Section numbers refer to RM0008 and RM0090: 7 reset and clock control. The bits used here mean the same in both, and
+// in RM0440 (STM32G4), except those in the header of the family.
 #include "board_clock.h"
 
 #include "board.h"
@@ -17,11 +18,9 @@
 #define PLLON   (1U << 24)
 #define PLLRDY  (1U << 25)
 #define SW      3U // RCC_CFGR: 7.3.2, F4 7.3.3
-#define SW_PLL  2U
 #define SWS     (3U << 2)
-#define SWS_PLL (2U << 2)
-#define RMVF    (1U << 24) // RCC_CSR: 7.3.10, F4 7.3.21
-#define PORRSTF (1U << 27)
+#define SWS_PLL (BRD_RCC_SW_PLL << 2)
+#define PORRSTF (1U << 27) // RCC_CSR: 7.3.10, F4 7.3.21. On an STM32G4 BORRSTF, which is set at power-on too.
 
 #define CRYSTAL_INPUT (BRD_CRYSTAL_IS_CLOCK != 0 ? HSEBYP : 0U)
 
@@ -48,7 +47,7 @@ static bool try_start(void) {
     if (!brd_clock_wait_for(&RCC_CR, PLLRDY, PLLRDY)) {
         return false;
     }
-    RCC_CFGR |= SW_PLL;
+    RCC_CFGR |= BRD_RCC_SW_PLL;
     return brd_clock_wait_for(&RCC_CFGR, SWS, SWS_PLL);
 }
 
@@ -58,13 +57,13 @@ bool brd_clock_start(void) {
         RCC_CR |= CSSON; // 7.2.7: a failure of the crystal raises the NMI and selects the internal oscillator.
         return true;
     }
-    RCC_CFGR &= ~SW;
+    RCC_CFGR = (RCC_CFGR & ~SW) | BRD_RCC_SW_INTERNAL;
     RCC_CR &= ~PLLON;
     return false;
 }
 
 bool brd_clock_was_power_on(void) {
     const bool was = (RCC_CSR & PORRSTF) != 0U;
-    RCC_CSR |= RMVF;
+    RCC_CSR |= BRD_RCC_RMVF;
     return was;
 }

@@ -18,6 +18,7 @@
 #define PRFTEN        (1U << 8)
 #define ICEN          (1U << 9)
 #define DCEN          (1U << 10)
+#define PREFETCH      ((BRD_CAN_PREFETCH != 0) ? PRFTEN : 0U)
 
 static_assert(BRD_CRYSTAL_HZ >= BRD_CRYSTAL_MIN_HZ && BRD_CRYSTAL_HZ <= BRD_CRYSTAL_MAX_HZ &&
                   BRD_PLL_INPUT_HZ * BRD_PLL_M == BRD_CRYSTAL_HZ,
@@ -31,7 +32,7 @@ static_assert(BRD_APB1_HZ * 4U == BRD_CORE_HZ, "PPRE1_QUARTER is what is written
 
 // Leaves the voltage scale at its value after reset: 1, which allows 168 MHz (5.4.1).
 bool brd_clock_prepare(void) {
-    FLASH_ACR = PRFTEN | ICEN | DCEN | BRD_FLASH_WAIT_STATES; // 3.5.1: before the clock rises, and read back.
+    FLASH_ACR = PREFETCH | ICEN | DCEN | BRD_FLASH_WAIT_STATES; // 3.5.1: before the clock rises, and read back.
     RCC_PLLCFGR =
         PLLR_LEAST | (BRD_PLL_Q << 24) | PLLSRC_HSE | ((BRD_PLL_P / 2U - 1U) << 16) | (BRD_PLL_N << 6) | BRD_PLL_M;
     RCC_CFGR = PPRE1_QUARTER | PPRE2_HALF; // AHB is not divided.

@@ -20,8 +20,13 @@ uint64_t brd_boot_id(uint32_t power_ons) {
     if (id == 0U) {
         count = (count == ~inverse) ? count + 1U : 1U;
         inverse = ~count;
-        id = mix(mix(((uint64_t)UNIQUE_ID[0] << 32 | UNIQUE_ID[1]) ^ UNIQUE_ID[2]) + ((uint64_t)power_ons << 32) +
-                 count);
+        const uint64_t parts[] = {((uint64_t)UNIQUE_ID[0] << 32 | UNIQUE_ID[1]) ^ UNIQUE_ID[2],
+                                  ((uint64_t)power_ons << 32) + count};
+        uint64_t mixed = 0;
+        for (unsigned i = 0; i < 2U; i++) {
+            mixed = mix(mixed + parts[i]);
+        }
+        id = mixed;
     }
     return id;
 }

@@ -1,14 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// Acceptance filters of the controller: the eleven ids of the iWheel, and no others.
-///
-/// The ids differ in few bits, so masks select them exactly:
-///
-/// | id, hex | bits that may differ | passes exactly                |
-/// |---------|----------------------|-------------------------------|
-/// | 0x100   | 0x021                | 256, 257, 288, 289 (0x100...) |
-/// | 0x200   | 0x021                | 512, 513, 544, 545 (0x200...) |
-/// | 0x10A   | 0x020                | 266, 298 (0x10A, 0x12A)       |
-/// | 0x122   | none                 | 290 (0x122)                   |
+/// Acceptance filters of the controller: the eleven ids of the iWheel (can_groups.h), and no others.
 ///
 /// The filters exist once for 11-bit ids (two of them in each 16-bit bank) and once for 29-bit ids with the same number
 /// (one in each 32-bit bank). Remote frames pass like data frames.

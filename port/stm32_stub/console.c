@@ -2,19 +2,15 @@
 // Section numbers refer to RM0008: 27.6; in RM0090 it is 30.6.
 #include "console.h"
 
+#include "usart.h"
+
 #include <assert.h>
 
-typedef struct {
-    volatile uint32_t SR, DR, BRR, CR1;
-} usart_t;
-
-#define USART2 ((usart_t *)0x40004400U)
 #define BAUD   115200U
 #define RXNE   (1U << 5)
 #define TXE    (1U << 7)
 #define RE     (1U << 2)
 #define TE     (1U << 3)
-#define UE     (1U << 13)
 #define LENGTH 512U
 
 static_assert((LENGTH & (LENGTH - 1U)) == 0U, "the indices wrap at a power of two");
@@ -23,8 +19,8 @@ static char waiting[LENGTH];
 static uint32_t put, taken; // Characters since the start.
 
 void brd_console_start(uint32_t apb1_hz) {
-    USART2->BRR = (apb1_hz + BAUD / 2U) / BAUD; // 27.3.4: in sixteenths.
-    USART2->CR1 = UE | TE | RE;
+    BRD_USART2->BRR = (apb1_hz + BAUD / 2U) / BAUD; // 27.3.4: in sixteenths.
+    BRD_USART2->CR1 = BRD_USART_UE | TE | RE;
 }
 
 /// Drops a character that does not fit: the control loop never waits for a terminal (R11).
@@ -61,16 +57,16 @@ void brd_console_hex(uint32_t value) {
 }
 
 bool brd_console_step(void) {
-    if (put != taken && (USART2->SR & TXE) != 0U) {
-        USART2->DR = (uint8_t)waiting[taken++ % LENGTH];
+    if (put != taken && (BRD_USART2->SR & TXE) != 0U) {
+        BRD_USART2->BRD_USART_TDR = (uint8_t)waiting[taken++ % LENGTH];
     }
     return put != taken;
 }
 
 bool brd_console_asked(void) {
-    if ((USART2->SR & RXNE) == 0U) {
+    if ((BRD_USART2->SR & RXNE) == 0U) {
         return false;
     }
-    (void)USART2->DR; // Clears RXNE, and the overrun of earlier characters (27.6.1).
+    brd_usart_discard(); // Clears RXNE, and the overrun of earlier characters (27.6.1).
     return true;
 }

@@ -7,13 +7,14 @@
 
 #include "iwheel/types.h"
 
-/// Interrupts of this port. The numbers are the same on every STM32F1 and F4.
+/// Interrupts of this port. The numbers are the same on every STM32F1, F4 and G4, except those of the bus controller.
 typedef enum {
     BRD_IRQ_EXTI0 = 6,
-    BRD_IRQ_SERIAL_RECEIVE = 16,  ///< DMA1 channel 6 on an F1, stream 5 on an F4.
-    BRD_IRQ_SERIAL_TRANSMIT = 17, ///< DMA1 channel 7 on an F1, stream 6 on an F4.
+    BRD_IRQ_SERIAL_RECEIVE = 16,  ///< DMA1 channel 6 on an F1 and G4, stream 5 on an F4.
+    BRD_IRQ_SERIAL_TRANSMIT = 17, ///< DMA1 channel 7 on an F1 and G4, stream 6 on an F4.
     BRD_IRQ_CAN_TRANSMIT = 19,
     BRD_IRQ_CAN_RECEIVE = 20,
+    BRD_IRQ_FDCAN = 21, ///< G4: FDCAN1, interrupt line 0. An image with bxCAN never enables it, and vice versa.
     BRD_IRQ_CAN_ERROR = 22,
     BRD_IRQ_SERIAL = 38, ///< USART2.
 } brd_irq_t;

@@ -28,8 +28,8 @@ static uint32_t address_of(unsigned page, unsigned word) {
     return BRD_STORE_ADDRESS + page * PAGE_BYTES + 4U * word;
 }
 
-const volatile uint32_t *brd_flash_page(unsigned page) {
-    return (const volatile uint32_t *)address_of(page, 0);
+uint32_t brd_flash_read(unsigned page, unsigned word) {
+    return *(const volatile uint32_t *)address_of(page, word);
 }
 
 static bool begin(uint32_t what) {

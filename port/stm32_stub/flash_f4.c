@@ -3,9 +3,10 @@
 #include "flash.h"
 
 #include "board.h"
+#include "watchdog.h"
 
 typedef struct {
-    volatile uint32_t ACR, KEYR, OPTKEYR, SR, CR;
+    volatile uint32_t ACR, KEYR, OPTKEYR, SR, CR, OPTCR;
 } flash_t;
 
 #define FLASH  ((flash_t *)0x40023C00U)
@@ -20,6 +21,7 @@ typedef struct {
 #define BSY    (1U << 16)
 #define EOP    (1U << 0)
 #define FAULTS (0xFU << 4)
+#define WDG_SW (1U << 5)  // OPTCR: an option byte; 0: the hardware starts the watchdog at each reset.
 #define DCEN   (1U << 10) // FLASH_ACR
 #define DCRST  (1U << 12)
 
@@ -33,8 +35,8 @@ static uint32_t address_of(unsigned page, unsigned word) {
     return sectors[page] + 4U * word;
 }
 
-const volatile uint32_t *brd_flash_page(unsigned page) {
-    return (const volatile uint32_t *)address_of(page, 0);
+uint32_t brd_flash_read(unsigned page, unsigned word) {
+    return *(const volatile uint32_t *)address_of(page, word);
 }
 
 static bool begin(uint32_t what) {
@@ -70,6 +72,9 @@ bool brd_flash_erase(unsigned page) {
     const uint32_t what = SER | SNB(FIRST_SECTOR + page) | BY_32;
     if (!begin(what)) {
         return false;
+    }
+    if ((FLASH->OPTCR & WDG_SW) == 0U) {
+        brd_watchdog_extend(); // It bites after 0.35 s at the earliest, and an erase lasts up to 2 s.
     }
     FLASH->CR = what | STRT;
     return end();

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
 /// Gateway on bare metal: one loop around the core. It sleeps until there is something to do.
-#include "bit_rate.h"
 #include "board_clock.h"
-#include "bxcan.h"
+#include "can.h"
 #include "commander.h"
 #include "console.h"
 #include "cortex_m.h"
@@ -14,39 +13,15 @@
 #include "report.h"
 #include "watchdog.h"
 
-// A poll takes at least 4 cycles, and the longest frame with an error at its end takes 200 us. This number of polls
-// takes at least 250 us and at most 1.5 ms.
-#define ABORT_POLLS (BRD_CORE_HZ / 4U / 4000U)
-#define CAN_RESET   (1U << 25) // In APB1RSTR of the RCC: RM0008 7.3.4 and RM0090 7.3.8.
 // Time after which a crystal that has not started is reported.
 #define CRYSTAL_LATE_US 100000U
 // Period of the loop while text waits.
 #define CHARACTER_US 1000U
 
 void brd_exti0_handler(void);
-void brd_can_transmit_handler(void);
-void brd_can_receive_handler(void);
-void brd_can_error_handler(void);
-
-static brd_bxcan_t bus; // At file scope, because interrupt handlers have no argument.
 
 void brd_exti0_handler(void) {
     brd_estop_on_edge();
-}
-
-void brd_can_transmit_handler(void) {
-    brd_bxcan_on_transmit(&bus);
-    brd_wake();
-}
-
-void brd_can_receive_handler(void) {
-    brd_bxcan_on_receive(&bus);
-    brd_wake();
-}
-
-void brd_can_error_handler(void) {
-    brd_bxcan_on_error(&bus);
-    brd_wake();
 }
 
 /// Tries until the crystal runs. Until then the internal oscillator counts the time; lamp and console report the state.
@@ -67,24 +42,6 @@ static void wait_for_crystal(void) {
     brd_console_start(BRD_APB1_HZ);
 }
 
-/// Sets silent mode if there is no command source. The acknowledgement of an image that only listens would look like
-/// that of a wheel, and would confirm frames of another master that no wheel has received.
-static void start_bus(void) {
-    const brd_bxcan_config_t config = {
-        .registers = (brd_bxcan_registers_t *)BRD_BXCAN_ADDRESS,
-        .filters = (brd_bxcan_registers_t *)BRD_BXCAN_ADDRESS,
-        .bit_timing = BRD_BIT_BTR,
-        .poll_limit = ABORT_POLLS,
-        .silent = !brd_commander_sends(),
-        .reset_register = (brd_register_t *)BRD_CAN_RESET_ADDRESS,
-        .reset_bits = CAN_RESET,
-    };
-    brd_bxcan_init(&bus, &config);
-    brd_irq_enable(BRD_IRQ_CAN_TRANSMIT);
-    brd_irq_enable(BRD_IRQ_CAN_RECEIVE);
-    brd_irq_enable(BRD_IRQ_CAN_ERROR);
-}
-
 static iw_config_t configuration(void) {
     iw_config_t config;
     iw_config_default(&config);
@@ -97,10 +54,8 @@ static iw_config_t configuration(void) {
 }
 
 static bool start_gateway(iw_gateway_t *gateway, const iw_config_t *config, bool restarted) {
-    static const iw_hal_t hal = {brd_bxcan_send,  brd_bxcan_receive, brd_bxcan_bus_state,
-                                 brd_bxcan_purge, brd_estop_pressed, &bus};
     const iw_bus_facts_t facts = {.timing_contradicted = false, .echo_proven = true};
-    if (iw_gateway_init(gateway, config, &hal, brd_time_now_us(), restarted) != IW_CONFIG_OK) {
+    if (iw_gateway_init(gateway, config, &brd_can_hal, brd_time_now_us(), restarted) != IW_CONFIG_OK) {
         return false;
     }
     iw_gateway_bus_facts(gateway, &facts);
@@ -132,7 +87,7 @@ int main(void) {
     static iw_gateway_t gateway;
     static brd_commander_t commander;
     const bool power_on = brd_clock_was_power_on();
-    const bool restarted = brd_marker_take(power_on);
+    const bool restarted = brd_marker_take();
     brd_commander_open(power_on, restarted);
     brd_watchdog_start();
     brd_pins_init();
@@ -140,7 +95,9 @@ int main(void) {
     brd_estop_init();
     brd_irq_enable(BRD_IRQ_EXTI0);
     const iw_config_t config = configuration();
-    start_bus();
+    // The acknowledgement of an image that only listens would look like that of a wheel, and would confirm frames of
+    // another master that no wheel has received.
+    brd_can_start(!brd_commander_sends());
     if (!start_gateway(&gateway, &config, restarted)) {
         return 1;
     }

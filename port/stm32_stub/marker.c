@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "marker.h"
 
-#define SENDING 0x5E4D146BU // Stored with its inverse: RAM does not contain such a pair after power-on.
+#define SENDING 0x5E4D146BU // Stored with its inverse: RAM that has lost its contents does not have such a pair.
 
 __attribute__((section(".noinit"))) static volatile uint32_t word, inverse;
 
@@ -14,8 +14,10 @@ static void set(bool sending) {
 }
 
 /// Does not clear a set marker: if this run ends before its zeros are acknowledged, the next run must find it.
-bool brd_marker_take(bool power_on) {
-    const bool was_sending = !power_on && word == SENDING && inverse == ~SENDING;
+/// A brown-out of the board alone counts as power-on, but RAM often survives it, and the wheels continue. A start then
+/// begins with zeros too.
+bool brd_marker_take(void) {
+    const bool was_sending = word == SENDING && inverse == ~SENDING;
     if (!was_sending) {
         set(false);
     }

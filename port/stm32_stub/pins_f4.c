@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Section numbers refer to RM0090: 7.3 clock enables, 8.4 ports, 9.2 system configuration.
+// Section numbers refer to RM0090: 7.3 clock enables, 8.4 ports, 9.2 system configuration. An STM32G4 has the same
+// registers at other addresses (RM0440 7.4, 9.4, 10.2), and the same numbers of the functions (DS12288 table 13).
 #include "pins.h"
 
 typedef struct {
@@ -9,19 +10,22 @@ typedef struct {
 
 static_assert(sizeof(port_t) == 0x400, "port B follows port A");
 
-#define AHB1ENR        (*(volatile uint32_t *)0x40023830U)
-#define APB1ENR        (*(volatile uint32_t *)0x40023840U)
-#define APB2ENR        (*(volatile uint32_t *)0x40023844U)
-#define SYSCFG_EXTICR1 (*(volatile uint32_t *)0x40013808U)
-#define PORTS          ((port_t *)0x40020000U)
+#define AHB1ENR        (*(volatile uint32_t *)BRD_PORT_CLOCKS)
+#define APB1ENR        (*(volatile uint32_t *)BRD_APB1_CLOCKS)
+#define APB2ENR        (*(volatile uint32_t *)BRD_APB2_CLOCKS)
+#define SYSCFG_EXTICR1 (*(volatile uint32_t *)BRD_EXTICR1_ADDRESS)
+#define PORTS          ((port_t *)BRD_PORTS_ADDRESS)
 
 // Two bits per pin in MODER (8.4.1), OSPEEDR (8.4.3) and PUPDR (8.4.4), four in AFR (8.4.9).
+#ifdef BRD_PINS_ARE_ANALOG
+#define INPUT 0U
+#endif
 #define OUTPUT    1U
 #define ALTERNATE 2U
 #define MEDIUM    1U // The slowest setting, that after reset, has edges of up to 100 ns: a tenth of a bit.
 #define PULL_UP   1U
 #define AF_USART2 7U
-#define AF_CAN1   9U
+#define AF_CAN1   9U // On an STM32G4 FDCAN1.
 
 static port_t *port_of(uint32_t pin) {
     return &PORTS[pin / 16U];
@@ -38,6 +42,15 @@ static void set_two(volatile uint32_t *fields, uint32_t pin, uint32_t value) {
 
 static void pull_up(uint32_t pin) {
     set_two(&port_of(pin)->PUPDR, pin, PULL_UP);
+}
+
+/// After a reset the pins of an STM32G4 are analog: they read low, as a released e-stop does. Those of an STM32F4 are
+/// inputs.
+static void set_input(uint32_t pin) {
+    pull_up(pin);
+#ifdef BRD_PINS_ARE_ANALOG
+    set_two(&port_of(pin)->MODER, pin, INPUT);
+#endif
 }
 
 static void set_alternate(uint32_t pin, uint32_t function) {
@@ -57,7 +70,7 @@ static void enable_clocks(void) {
     }
     AHB1ENR |= ports;                   // 7.3.10
     APB1ENR |= (1U << 25) | (1U << 17); // 7.3.13: CAN1, USART2.
-    APB2ENR |= 1U << 14;                // 7.3.14: SYSCFG.
+    APB2ENR |= BRD_SYSCFG_CLOCK;        // 7.3.14
 }
 
 /// Sets the pull-ups before the first read, so that an open contact or a cut wire reads high from the beginning.
@@ -65,8 +78,8 @@ void brd_pins_init(void) {
     enable_clocks();
     brd_pins_lamp(false);
     set_two(&port_of(BRD_LAMP)->MODER, BRD_LAMP, OUTPUT);
-    pull_up(BRD_ESTOP);
-    pull_up(BRD_BUTTON);
+    set_input(BRD_ESTOP);
+    set_input(BRD_BUTTON);
     pull_up(BRD_CAN_RX); // Without a transceiver the pin reads recessive.
     pull_up(BRD_UART_RX);
     set_alternate(BRD_CAN_RX, AF_CAN1);

@@ -4,6 +4,7 @@
 #include "bit_rate.h"
 #include "commander.h"
 #include "console.h"
+#include "fault.h"
 #include "pins.h"
 
 #include "iwheel_northbound/words.h"
@@ -35,7 +36,8 @@ static void tell_board(void) {
     brd_console_number(BRD_APB1_HZ / BRD_BIT_PRESCALER / BRD_BIT_QUANTA);
     brd_console_text(" bit/s, sampled at ");
     brd_console_number((1U + BRD_BIT_BS1) * 100U / BRD_BIT_QUANTA);
-    brd_console_text((1000U * (1U + BRD_BIT_BS1) / BRD_BIT_QUANTA % 10U == 5U) ? ".5 %, BTR " : " %, BTR ");
+    brd_console_text((1000U * (1U + BRD_BIT_BS1) / BRD_BIT_QUANTA % 10U == 5U) ? ".5 %, " BRD_BIT_REGISTER " "
+                                                                               : " %, " BRD_BIT_REGISTER " ");
     brd_console_hex(BRD_BIT_BTR);
 }
 
@@ -45,6 +47,13 @@ void brd_report_start(bool restarted) {
     pin(BRD_ESTOP);
     brd_console_text(brd_pins_estop_high() ? ": pressed; " : ": released; ");
     brd_console_text(brd_commander_name());
+    const brd_fault_t fault = brd_fault_take();
+    if (fault.cause != 0U) {
+        brd_console_text("; the previous run ended with fault ");
+        brd_console_hex(fault.cause);
+        brd_console_text(" at ");
+        brd_console_hex(fault.pc);
+    }
     brd_console_text(restarted ? "; the run before was sending: zeros first\r\n" : "\r\n");
     shown = 0;
 }

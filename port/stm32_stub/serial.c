@@ -2,21 +2,16 @@
 #include "serial.h"
 
 #include "cortex_m.h"
+#include "usart.h"
 
 #include <stdatomic.h>
 #include <string.h>
 
-typedef struct {
-    volatile uint32_t SR, DR, BRR, CR1, CR2, CR3;
-} usart_t;
-
-#define USART2 ((usart_t *)0x40004400U)
 #define ERRORS (7U << 1) // SR: framing, noise, overrun.
 #define TC     (1U << 6)
 #define RE     (1U << 2) // CR1
 #define TE     (1U << 3)
 #define IDLEIE (1U << 4)
-#define UE     (1U << 13)
 #define EIE    (1U << 0) // CR3
 #define DMAR   (1U << 6)
 #define DMAT   (1U << 7)
@@ -38,14 +33,14 @@ static bool lent_is_sending;
 static atomic_bool had_error;
 
 void brd_serial_start(uint32_t apb1_hz) {
-    USART2->CR1 = 0;
+    BRD_USART2->CR1 = 0;
     taken = put = sent = sending = 0;
     lent = NULL;
     lent_is_sending = false;
-    USART2->BRR = (apb1_hz + BRD_SERIAL_BAUD / 2U) / BRD_SERIAL_BAUD; // 27.3.4: sixteenths.
-    USART2->CR3 = DMAR | DMAT | EIE;
-    brd_serial_dma_start(&USART2->DR, received, sizeof received);
-    USART2->CR1 = UE | TE | RE | IDLEIE;
+    BRD_USART2->BRR = (apb1_hz + BRD_SERIAL_BAUD / 2U) / BRD_SERIAL_BAUD; // 27.3.4: sixteenths.
+    BRD_USART2->CR3 = DMAR | DMAT | EIE;
+    brd_serial_dma_start(&BRD_USART2->BRD_USART_RDR, received, sizeof received);
+    BRD_USART2->CR1 = BRD_USART_UE | TE | RE | IDLEIE;
     brd_irq_enable(BRD_IRQ_SERIAL_RECEIVE);
     brd_irq_enable(BRD_IRQ_SERIAL_TRANSMIT);
     brd_irq_enable(BRD_IRQ_SERIAL);
@@ -61,7 +56,13 @@ size_t brd_serial_read(char *out, size_t size) {
     return count;
 }
 
+/// A bus error disables the receive channel (13.3.4). It starts again, with the loss of the bytes meanwhile.
 bool brd_serial_had_error(void) {
+    if (!brd_serial_dma_receives()) {
+        taken = 0;
+        brd_serial_dma_start(&BRD_USART2->BRD_USART_RDR, received, sizeof received);
+        return true;
+    }
     return atomic_exchange_explicit(&had_error, false, memory_order_relaxed);
 }
 
@@ -96,7 +97,7 @@ bool brd_serial_lends(void) {
 }
 
 bool brd_serial_is_idle(void) {
-    return put == sent && lent == NULL && !brd_serial_dma_sends() && (USART2->SR & TC) != 0U;
+    return put == sent && lent == NULL && !brd_serial_dma_sends() && (BRD_USART2->SR & TC) != 0U;
 }
 
 /// Marks the bytes as sent that the DMA has passed to the USART.
@@ -114,26 +115,27 @@ void brd_serial_step(void) {
         return;
     }
     settle();
-    if (lent != NULL && sent == lent_at) {
-        lent_is_sending = true;
-        brd_serial_dma_send(&USART2->DR, lent, lent_bytes);
-        return;
+    const char *from = lent;
+    uint32_t length = lent_bytes;
+    lent_is_sending = lent != NULL && sent == lent_at;
+    if (!lent_is_sending) {
+        const uint32_t until = (lent != NULL) ? lent_at : put;
+        const uint32_t to_end = BRD_SERIAL_SEND_BYTES - sent % BRD_SERIAL_SEND_BYTES;
+        length = sending = (until - sent < to_end) ? until - sent : to_end;
+        from = &waiting[sent % BRD_SERIAL_SEND_BYTES];
     }
-    const uint32_t until = (lent != NULL) ? lent_at : put;
-    const uint32_t to_end = BRD_SERIAL_SEND_BYTES - sent % BRD_SERIAL_SEND_BYTES;
-    sending = (until - sent < to_end) ? until - sent : to_end;
-    if (sending > 0U) {
-        brd_serial_dma_send(&USART2->DR, &waiting[sent % BRD_SERIAL_SEND_BYTES], sending);
+    if (length > 0U) {
+        brd_usart_clear_complete(); // 27.3.13: the DMA does not clear TC, which would still show the last run's end.
+        brd_serial_dma_send(&BRD_USART2->BRD_USART_TDR, from, length);
     }
 }
 
-/// Reading SR, then DR, clears pause and errors (27.6.1). The DMA has already fetched the byte in DR, or the byte is
-/// damaged.
+/// The read of SR is the first half of the clearing of pause and errors (27.6.1).
 void brd_serial_usart_handler(void) {
-    if ((USART2->SR & ERRORS) != 0U) {
+    if ((BRD_USART2->SR & ERRORS) != 0U) {
         atomic_store_explicit(&had_error, true, memory_order_relaxed);
     }
-    (void)USART2->DR;
+    brd_usart_clear();
     brd_wake();
 }
 

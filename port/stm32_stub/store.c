@@ -18,7 +18,7 @@ static_assert(BRD_STORE_WORDS + 2U <= CRC_AT, "sequence, payload and CRC fit a s
 static_assert(BLANK_LEAST < SLOTS, "a page that was just begun has so many");
 
 static uint32_t read(unsigned page, unsigned slot, unsigned word) {
-    return brd_flash_page(page)[slot * SLOT_WORDS + word];
+    return brd_flash_read(page, slot * SLOT_WORDS + word);
 }
 
 static uint32_t crc_of(unsigned page, unsigned slot) {

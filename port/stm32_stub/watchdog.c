@@ -16,6 +16,7 @@ typedef struct {
 #define UNLOCK 0x5555U
 #define START  0xCCCCU
 #define BY_4   0U
+#define BY_256 6U
 #define RELOAD (BRD_LSI_MAX_HZ / 4U * BRD_WATCHDOG_MS / 1000U + 1U)
 
 // The registers accept the values within 5 cycles of the slow oscillator. A read of SR takes at least 8 cycles of the
@@ -24,14 +25,25 @@ typedef struct {
 
 static_assert(RELOAD <= 0xFFFU, "12 bits");
 
+static void wait_until_accepted(void) {
+    for (uint32_t poll = 0; IWDG->SR != 0U && poll < POLLS_MAX; poll++) {
+    }
+    brd_watchdog_feed();
+}
+
 void brd_watchdog_start(void) {
     IWDG->KR = START;
     IWDG->KR = UNLOCK;
     IWDG->PR = BY_4;
     IWDG->RLR = RELOAD;
-    for (uint32_t poll = 0; IWDG->SR != 0U && poll < POLLS_MAX; poll++) {
-    }
-    brd_watchdog_feed();
+    wait_until_accepted();
+}
+
+/// The reload value is the highest since the reset.
+void brd_watchdog_extend(void) {
+    IWDG->KR = UNLOCK;
+    IWDG->PR = BY_256;
+    wait_until_accepted();
 }
 
 void brd_watchdog_feed(void) {

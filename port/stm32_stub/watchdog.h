@@ -10,4 +10,7 @@
 void brd_watchdog_start(void);
 void brd_watchdog_feed(void);
 
+/// Extends the period of a watchdog that runs since the reset to 22 s at least, until `brd_watchdog_start`.
+void brd_watchdog_extend(void);
+
 #endif

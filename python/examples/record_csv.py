@@ -11,9 +11,10 @@ import argparse
 import csv
 import sys
 import time
+from collections.abc import Mapping
 from typing import Any
 
-from iwheel import Gateway, GatewayUnavailable, IWheelError, ProtocolError
+from iwheel import Event, Gateway, GatewayUnavailable, IWheelError, ProtocolError, StateEvent
 
 SIDES = ("left", "right")
 FIELDS = ("commanded_mm_s", "applied_mm_s", "speed_mm_s", "force_raw_mN", "force_net_mN", "battery_dV", "distance_mm")
@@ -28,9 +29,10 @@ def report(text: str) -> None:
     print(f"record_csv.py: {text}", file=sys.stderr, flush=True)
 
 
-def row_of(event: dict[str, Any], begin_us: int) -> list[Any]:
+def row_of(event: StateEvent, begin_us: int) -> list[Any]:
     """Returns one line; None becomes an empty field."""
-    values = [event[side][field] for side in SIDES for field in FIELDS]
+    wheels: tuple[Mapping[str, Any], ...] = (event["left"], event["right"])
+    values = [wheel[field] for wheel in wheels for field in FIELDS]
     return [f"{(event['t_us'] - begin_us) / 1e6:.3f}", event["state"], *values]
 
 
@@ -45,7 +47,7 @@ def report_if_waiting(socket: str | None) -> None:
         report(f"{trouble}. Waiting for the gateway, {WAIT_S // 60} minutes at most; Ctrl-C ends")
 
 
-def note(event: dict[str, Any]) -> None:
+def note(event: Event) -> None:
     """Reports an event that is not a line of the file."""
     if event["event"] == "disconnected":
         report(f"{event['message']}. Waiting until the gateway is back; Ctrl-C ends")

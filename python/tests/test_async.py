@@ -7,6 +7,7 @@ import time
 import unittest
 import warnings
 
+import pytest
 from rig import RigCase, now_us
 
 from iwheel import AsyncGateway, ConnectionLost, GatewayUnavailable, LeaseEnded, Refused
@@ -170,6 +171,7 @@ class Async(RigCase):
         self.assertGreater(len(seen), 3)
         self.assert_stood_by(now_us(), 0)
 
+    @pytest.mark.pace(1)
     def test_replies_of_the_gateway_are_returned(self):
         async def story():
             async with AsyncGateway(self.socket) as gateway:

@@ -12,11 +12,13 @@ import tempfile
 import time
 import unittest
 
-from rig import ROOT, RigCase, now_us
+import pytest
+from rig import SOURCES, RigCase, now_us
 from stand_in import StandIn
 
 from iwheel import AsyncGateway, Refused
 
+pytestmark = pytest.mark.native("a race")
 COUNT = int(os.environ.get("IWHEEL_CANCELLATIONS", "2400"))
 END_S = 0.1
 """A cancelled task ends within this time, including its stop if the wheels are already at standstill."""
@@ -354,7 +356,7 @@ class CancelledWithRig(RigCase):
     def run_program(self, script, *end):
         child = subprocess.Popen(
             [sys.executable, "-c", "import asyncio, os, sys, threading, time\nfrom iwheel import *\n" + script, self.socket],
-            env={**os.environ, "PYTHONPATH": os.pathsep.join([os.path.join(ROOT, "python", "src"), os.environ.get("PYTHONPATH", "")])},
+            env={**os.environ, "PYTHONPATH": os.pathsep.join([SOURCES, os.environ.get("PYTHONPATH", "")])},
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,

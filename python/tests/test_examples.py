@@ -12,11 +12,11 @@ import sys
 import time
 import unittest
 
-from rig import EXAMPLES, ROOT, RigCase, now_us
+from rig import EXAMPLES, SOURCES, RigCase, now_us
 
 from iwheel import Gateway
 
-ENVIRONMENT = {**os.environ, "PYTHONPATH": os.path.join(ROOT, "python", "src")}
+ENVIRONMENT = {**os.environ, "PYTHONPATH": SOURCES}
 
 
 class Examples(RigCase):

@@ -11,7 +11,10 @@ import threading
 import time
 import unittest
 
-from rig import BUILD, ROOT, RigCase
+import pytest
+from rig import BUILD, ROOT, RigCase, require_gateway
+
+require_gateway()
 
 import iwheel
 from client import Closed
@@ -181,6 +184,7 @@ class Story(unittest.TestCase):
             self.witness.event(event)
         client.events.clear()
 
+    @pytest.mark.pace(1)
     def test_gateway_messages_match_the_description_both_ways(self):
         self.rig.sim.ask("mute both")
         self.rig.sim.ask("raw left 32767")

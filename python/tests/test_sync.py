@@ -13,7 +13,8 @@ import unittest
 import warnings
 from fractions import Fraction
 
-from rig import ROOT, RigCase, now_us
+import pytest
+from rig import SOURCES, RigCase, now_us
 
 from iwheel import AsyncGateway, ConnectionLost, Gateway, GatewayUnavailable, LeaseEnded, NoAnswer, ProtocolError, Refused
 from iwheel._wire import add_piece
@@ -154,7 +155,7 @@ class Driving(RigCase):
         self.assertLess(self.last_motion_us(), frozen_us + BUDGET_MS * 1000, "it moved again after waking up")
 
     def python(self, script):
-        environment = {**os.environ, "PYTHONPATH": os.path.join(ROOT, "python", "src")}
+        environment = {**os.environ, "PYTHONPATH": SOURCES}
         child = subprocess.Popen([sys.executable, "-c", script, self.socket], env=environment, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
 
         def end():
@@ -417,6 +418,7 @@ class OnStatus(RigCase):
 class Answers(RigCase):
     """The gateway's replies are returned."""
 
+    @pytest.mark.pace(1)
     def test_tare_returns_the_new_zero_and_the_previous_one(self):
         with Gateway(self.socket) as gateway:
             self.wait_until(lambda: self.granted(gateway.tare), 6)
@@ -499,6 +501,7 @@ class Reconnecting(RigCase):
                     break
             self.assertEqual([name for name in seen if name != "state"], ["disconnected", "reconnected"])
 
+    @pytest.mark.pace(1)
     def test_unread_events_are_counted_as_lost(self):
         with Gateway(self.socket) as gateway:
             gateway.watch("frame")

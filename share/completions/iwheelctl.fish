@@ -43,6 +43,8 @@ function __iwheel_value
         case --estop
             echo none
             __fish_complete_path (commandline -ct)
+        case --to
+            printf '%s\n' mcap csv blf
         case --log-level
             printf '%s\n' error warning info debug
         case --how --for --listen --rate --frames --current --seed --uptime --last --since --until --wait

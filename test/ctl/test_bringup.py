@@ -2,6 +2,7 @@
 """iwheelctl bringup from start to end against simulated wheels that are not as assumed, and its ways out."""
 
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -88,6 +89,17 @@ class Bringup(unittest.TestCase):
         if not gear:
             operator.answer("Turn the wheels by hand?", "n")
         return operator
+
+    def leave(self, operator, seconds=20.0):
+        """Repeats and saves nothing. Returns the exit code."""
+        end = time.monotonic() + seconds
+        while operator.process.poll() is None and time.monotonic() < end:
+            operator.pump(0.05)
+            asked = re.search(r"(Do\sit\sagain\?|continue\slater\?) \[y\] ", operator.text[operator.seen :])
+            if asked:
+                operator.seen += asked.end()
+                operator.type("n\n")
+        return operator.wait()
 
     def moving(self):
         """Setpoints on the bus that are no zeros."""
@@ -301,7 +313,7 @@ class Bringup(unittest.TestCase):
         operator.answer("current_role", "")
         self.look_at_signs(operator, mirrored=())
         operator.answer("Measure the force?", "q")
-        self.assertEqual(1, operator.wait())
+        self.assertEqual(1, self.leave(operator))
         self.assertIn("Nothing was written", operator.text)
         self.assertFalse(os.path.exists(self.out))
 
@@ -361,7 +373,7 @@ class Bringup(unittest.TestCase):
         operator.expect("have 8 bytes")
         operator.answer("types to try", "")
         operator.answer("Did both wheels turn", "q")
-        self.assertEqual(1, operator.wait())
+        self.assertEqual(1, self.leave(operator))
         self.assertEqual({8}, {len(frame.data) for frame in self.rig.bus.frames if frame.id in (266, 298)})
 
     def test_recording_without_a_speed_leaves_the_types_to_try(self):
@@ -372,7 +384,7 @@ class Bringup(unittest.TestCase):
         operator.expect("has no setpoint with a speed")
         operator.expect("types to try [0-7] ")
         operator.type("q\n")
-        self.assertEqual(1, operator.wait())
+        self.assertEqual(1, self.leave(operator))
 
     def test_any_key_stops_the_wheels_immediately(self):
         operator = self.begin()
@@ -388,7 +400,7 @@ class Bringup(unittest.TestCase):
         late = [frame for frame in self.moving() if frame[0] > pressed_us + 150_000]
         self.assertFalse(late, "nonzero setpoints after the key")
         operator.answer("Try again?", "q")
-        self.assertEqual(1, operator.wait())
+        self.assertEqual(1, self.leave(operator))
 
     def test_no_type_that_moves_asks_again_and_stores_none(self):
         self.rig.sim.ask("type 200")
@@ -398,7 +410,7 @@ class Bringup(unittest.TestCase):
         operator.answer("types to try", "0-1")
         operator.expect("None of these moved both wheels")
         operator.answer("types to try", "q")
-        self.assertEqual(1, operator.wait())
+        self.assertEqual(1, self.leave(operator))
         self.assertFalse(os.path.exists(self.out))
 
     def test_exchanged_wheels_end_it_with_the_fix(self):
@@ -409,7 +421,7 @@ class Bringup(unittest.TestCase):
         operator.answer("Watch the left wheel", "")
         operator.answer("r: repeat)", "o")
         operator.expect("exchange the wheels")
-        self.assertEqual(1, operator.wait())
+        self.assertEqual(1, self.leave(operator))
 
     def test_feedback_of_wrong_sign_ends_bringup_with_the_reason(self):
         self.rig.sim.ask("sign right swapped")
@@ -421,7 +433,7 @@ class Bringup(unittest.TestCase):
         operator.answer("r: repeat)", "f")
         operator.answer("Watch the right wheel", "")
         operator.expect("measures the opposite")
-        self.assertEqual(1, operator.wait())
+        self.assertEqual(1, self.leave(operator))
 
     def test_interrupt_while_wheels_turn_stops_them_and_cleans_up(self):
         operator = self.begin()
@@ -430,7 +442,7 @@ class Bringup(unittest.TestCase):
         time.sleep(0.5)
         operator.type("\x03")
         operator.answer("Try again?", "q")
-        self.assertEqual(1, operator.wait())
+        self.assertEqual(1, self.leave(operator))
         self.assertIn("STOPPED", operator.text)
         time.sleep(0.3)
         quiet = len(self.rig.bus.setpoints())
@@ -471,7 +483,7 @@ class Bringup(unittest.TestCase):
         operator = self.start()
         operator.answer("finger on the e-stop?", "y")
         operator.expect("Fix the failed checks")
-        self.assertEqual(1, operator.wait())
+        self.assertEqual(1, self.leave(operator))
         hold(not self.rig.bus.setpoints(), "setpoints without the checks")
 
     def test_existing_file_is_replaced_after_a_question_and_saved(self):
@@ -509,7 +521,7 @@ class Bringup(unittest.TestCase):
         operator.expect("Release it")
         self.rig.sim.ask("estop release")
         operator.answer("Turn the wheels by hand?", "q")
-        self.assertEqual(1, operator.wait())
+        self.assertEqual(1, self.leave(operator))
 
     def test_gear_from_wrong_or_missing_turns_is_not_concluded(self):
         operator = self.begin(gear=True)
@@ -524,14 +536,14 @@ class Bringup(unittest.TestCase):
             operator.answer("Try again?", "y" if expected != "back and forth" else "n")
         operator.expect("The gear is unchanged")
         operator.answer("types to try", "q")
-        self.assertEqual(1, operator.wait())
+        self.assertEqual(1, self.leave(operator))
 
     def test_gear_that_differs_from_wheel_to_wheel_is_none(self):
         operator = self.begin(gear=True)
         self.turn_by_hand(operator, 192, turns=(3, 4), answer=None)
         operator.expect("The gear is unchanged")
         operator.answer("types to try", "q")
-        self.assertEqual(1, operator.wait())
+        self.assertEqual(1, self.leave(operator))
 
     def test_gear_with_unknown_rpm_reference_is_not_confirmed(self):
         for command in ("gear both 4", "rpm left rotor"):
@@ -556,7 +568,7 @@ class Bringup(unittest.TestCase):
         operator.answer("Did both wheels turn", "y")
         operator.expect("noted as not confirmed")
         operator.answer("current_role", "q")
-        self.assertEqual(1, operator.wait())
+        self.assertEqual(1, self.leave(operator))
 
     def test_type_that_turns_one_wheel_only_is_not_accepted(self):
         self.rig.sim.ask("block right")
@@ -565,7 +577,7 @@ class Bringup(unittest.TestCase):
         operator.expect("Only the left wheel turned")
         operator.expect("None of these moved both wheels")
         operator.answer("types to try", "q")
-        self.assertEqual(1, operator.wait())
+        self.assertEqual(1, self.leave(operator))
 
     def test_wheels_that_cannot_turn_are_no_limit(self):
         operator = self.begin()
@@ -619,7 +631,7 @@ class Bringup(unittest.TestCase):
         self.rig.sim.ask("unblock left")
         self.look_at_signs(operator, mirrored=())
         operator.answer("Measure the force?", "q")
-        self.assertEqual(1, operator.wait())
+        self.assertEqual(1, self.leave(operator))
 
     def test_wheel_that_turns_untold_ends_the_signs(self):
         operator = self.begin()
@@ -629,7 +641,7 @@ class Bringup(unittest.TestCase):
         operator.seen -= len("Watch the left wheel")
         operator.answer("Watch the left wheel", "")
         operator.expect("BOTH wheels turned")
-        self.assertEqual(1, operator.wait())
+        self.assertEqual(1, self.leave(operator))
 
     def test_force_that_ends_sways_or_saturates_is_no_unit(self):
         operator = self.begin()
@@ -654,7 +666,7 @@ class Bringup(unittest.TestCase):
         operator.expect("The force swayed")
         operator.answer("Try again?", "n")
         operator.answer("Distance in m", "q")
-        self.assertEqual(1, operator.wait())
+        self.assertEqual(1, self.leave(operator))
 
     def test_radius_and_track_rest_on_gear_and_distance_and_say_so(self):
         operator = self.begin()
@@ -744,7 +756,7 @@ class Bringup(unittest.TestCase):
         operator.type("\n")
         operator.expect("too busy to follow the wheels")
         operator.answer("How many full turns", "q")
-        self.assertEqual(1, operator.wait())
+        self.assertEqual(1, self.leave(operator))
 
     def begin_to_turn(self, operator):
         operator.answer("How many full turns", "3")
@@ -752,6 +764,88 @@ class Bringup(unittest.TestCase):
         operator.expect("press Enter ...")
         self.rig.sim.ask("turn 3")
         time.sleep(0.5)
+
+    # --- a disturbed step, and results that are saved --------------------------------------------------------------
+
+    def test_disturbed_step_is_repeated_by_enter(self):
+        operator = self.begin()
+        operator.answer("types to try", "1")
+        operator.expect("Did both wheels turn")
+        self.rig.sim.ask("estop press")
+        operator.seen -= len("Did both wheels turn")
+        operator.answer("Did both wheels turn", "y")
+        operator.answer("Try again?", "n")
+        moved = len(self.moving())
+        operator.expect("Do it again?")
+        self.rig.sim.ask("estop release")
+        operator.seen -= len("Do it again?")
+        operator.answer("Do it again?", "")
+        operator.expect("Step 5 of 10")
+        operator.answer("current_role", "")
+        self.assertGreater(len(self.moving()), moved)
+        self.look_at_signs(operator, mirrored=())
+        operator.answer("Measure the force?", "n")
+        operator.answer("Distance in m", "")
+        operator.answer("How many full turns", "")
+        found = self.write(operator)
+        self.assertTrue(found["current_role"].startswith("confirmed: "), found)
+
+    def save(self):
+        """Ends after the role, with the results saved. Returns the path of the file."""
+        operator = self.begin()
+        self.drive_through(operator, signs=False)
+        operator.answer("Watch the left wheel", "q")
+        operator.answer("Save the 2 confirmed results", "")
+        self.assertEqual(1, operator.wait())
+        self.assertIn("--from " + self.out + ".part", "".join(operator.text.split("\n")))
+        self.assertFalse(os.path.exists(self.out))
+        return self.out + ".part"
+
+    def go_on(self, path, same):
+        """Continues with the saved file, through the checks and the e-stop."""
+        command = [find_program(BUILD, "iwheelctl"), "bringup", self.out, "--from", path]
+        operator = Operator(command, environment(self.runtime))
+        self.addCleanup(self.end, operator)
+        operator.answer("finger on the e-stop?", "y")
+        if same:
+            operator.answer("The same wheels, mounted in the same way?", same)
+        operator.expect("Press the e-stop button now")
+        self.rig.sim.ask("estop press")
+        operator.expect("Release it")
+        self.rig.sim.ask("estop release")
+        operator.answer("Turn the wheels by hand?", "n")
+        return operator
+
+    def test_saved_results_are_left_out_and_confirmed_at_the_end(self):
+        operator = self.go_on(self.save(), same="y")
+        operator.expect("Step 4 of 10: confirmed by the earlier bringup; left out")
+        operator.expect("Step 5 of 10: confirmed by the earlier bringup; left out")
+        self.look_at_signs(operator, mirrored=())
+        operator.answer("Measure the force?", "n")
+        operator.answer("Distance in m", "")
+        operator.answer("How many full turns", "")
+        found = self.write(operator)
+        self.assertEqual(("1", "limit"), (self.value("wheels", "setpoint_type"), self.value("wheels", "current_role")))
+        for key in ("setpoint_type", "current_role", "invert"):
+            self.assertTrue(found[key].startswith("confirmed: "), found)
+        with open(self.out, encoding="utf-8") as file:
+            self.assertNotIn("BRINGUP SAVED", file.read())
+
+    def test_saved_results_of_other_wheels_do_not_count(self):
+        operator = self.go_on(self.save(), same="n")
+        operator.answer("types to try", "q")
+        self.assertEqual(1, self.leave(operator))
+
+    def test_saved_results_in_a_changed_file_do_not_count(self):
+        path = self.save()
+        with open(path, encoding="utf-8") as file:
+            text = file.read()
+        with open(path, "w", encoding="utf-8") as file:
+            file.write(text.replace("setpoint_type = 1 ", "setpoint_type = 2 "))
+        operator = self.go_on(path, same=None)
+        self.assertIn("was changed after bringup had saved it", " ".join(operator.text.split()))
+        operator.answer("types to try", "q")
+        self.assertEqual(1, self.leave(operator))
 
     # --- ways out, and nothing left behind (see nothing_left_behind) ----------------------------------------------
 
@@ -820,7 +914,7 @@ class Bringup(unittest.TestCase):
         self.addCleanup(operator.close)
         operator.answer("finger on the e-stop?", "y")
         operator.expect("A gateway already runs on this bus")
-        self.assertEqual(1, operator.wait())
+        self.assertEqual(1, self.leave(operator))
 
     def test_end_of_input_ends_it_and_wrong_words_are_usage(self):
         program = find_program(BUILD, "iwheelctl")

@@ -11,12 +11,15 @@ import tempfile
 import time
 import unittest
 
+import pytest
+
 ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
 from harness import find_program
 
+pytestmark = pytest.mark.native("processor time: these start hundreds of programs and hardly wait")
 BUILD = os.environ["IWHEEL_BUILD"]
 # Those that talk with a person.
-WITHOUT_JSON = {"top", "bringup", "help", "web"}
+WITHOUT_JSON = {"top", "bringup", "help", "web", "export"}
 
 
 def run(*words, program="iwheelctl", path=None, **more):

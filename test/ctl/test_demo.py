@@ -4,14 +4,19 @@
 import concurrent.futures
 import contextlib
 import os
+import re
+import shutil
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
 import time
 import unittest
 
+import pytest
 
+pytestmark = pytest.mark.native("a signal between two system calls")
 ROOT = os.path.abspath(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", ".."))
 BUILD = os.environ["IWHEEL_BUILD"]
 
@@ -121,3 +126,71 @@ class Interrupted(unittest.TestCase):
         done = self.play_with("kill -INT $PPID\nexit 1\n")
         self.assertEqual(130, done.returncode, done.stdout + done.stderr)
         self.assertNotIn("FAILED", done.stderr)
+
+
+class Others(unittest.TestCase):
+    """The demonstrations that run until Ctrl-C."""
+
+    def setUp(self):
+        self.folder = tempfile.mkdtemp(prefix="d")
+        self.addCleanup(shutil.rmtree, self.folder)
+        with socket.socket() as one, socket.socket() as next_one:
+            one.bind(("127.0.0.1", 0))
+            self.port = one.getsockname()[1]
+            next_one.bind(("127.0.0.1", 0))
+            self.taken = next_one.getsockname()[1]
+
+    def start(self, name, *words):
+        process = subprocess.Popen(
+            [sys.executable, "-u", os.path.join(ROOT, "app", "demo", name), "--build", BUILD, *words],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            start_new_session=True,
+            env={**os.environ, "TMPDIR": self.folder},
+        )
+        self.addCleanup(process.stdout.close)
+        self.addCleanup(process.wait)
+        self.addCleanup(process.kill)
+        return process
+
+    def test_web_names_the_socket_drives_and_leaves_nothing(self):
+        if not os.path.exists(os.path.join(BUILD, "app", "bridge", "web", "iwheel-web")):
+            self.skipTest("iwheel-web is not built")
+        for number, expected in ((signal.SIGINT, 0), (signal.SIGHUP, 129), (signal.SIGTERM, 143)):
+            process = self.start("web.py", "--port", str(self.port))
+            said = ""
+            while "Ctrl-C ends it." not in said:
+                line = process.stdout.readline()
+                self.assertTrue(line, said)
+                said += line
+            self.assertIn(f":{self.port}/", said)
+            path = re.search(r"export IWHEEL_SOCKET=(\S+)", said).group(1)
+            drive = re.search(r"^ +(\S*iwheelctl drive \d+ \d+) --for 3s$", said, re.MULTILINE).group(1)
+            done = subprocess.run([*drive.split(), "--for", "500ms"], env={**os.environ, "IWHEEL_SOCKET": path}, cwd=os.getcwd(), timeout=30, check=False)
+            self.assertEqual(done.returncode, 0)
+            os.killpg(process.pid, number)
+            time.sleep(0.05)
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, number)  # An impatient person.
+            self.assertEqual(process.wait(20), expected)
+            self.assertEqual(([], []), (os.listdir(self.folder), still_running(process.pid)))
+
+    def test_port_in_use_is_named_with_its_fix(self):
+        with socket.socket() as one:
+            one.bind(("127.0.0.1", self.taken))
+            one.listen()
+            for name, option in (("web.py", "--web"), ("fleet.py", "--fleet")):
+                process = self.start(name, "--port", str(self.taken))
+                said = process.communicate(timeout=20)[0]
+                self.assertEqual(process.returncode, 1, said)
+                self.assertIn(f"port {self.taken} is not free", said)
+                self.assertIn(f"./demo {option} --port N", said)
+        self.assertEqual([], os.listdir(self.folder))
+
+    def test_options_without_effect_are_refused(self):
+        for words, said in ((("--port", "8000"), "--port is for"), (("--web", "--port", "70000"), "1 to 65534"), (("--ros", "--keep"), "--keep is for")):
+            done = subprocess.run([os.path.join(ROOT, "demo"), *words], capture_output=True, text=True, timeout=20, check=False)
+            self.assertEqual(done.returncode, 64)
+            self.assertIn(said, done.stderr)

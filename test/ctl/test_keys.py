@@ -61,6 +61,7 @@ class Keys(unittest.TestCase):
         end = time.monotonic() + 5
         while not holds(self.status()):
             self.assertLess(time.monotonic(), end, what)
+            time.sleep(0.01)
 
     def test_each_key_injects_reports_and_removes_its_fault(self):
         operator = self.start()

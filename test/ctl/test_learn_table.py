@@ -13,6 +13,9 @@ import subprocess
 import unittest
 from dataclasses import dataclass, replace
 
+import pytest
+
+pytestmark = pytest.mark.exact
 PROGRAM = os.path.join(os.environ["IWHEEL_BUILD"], "app", "ctl", "iwheelctl")
 SIDES = ("left", "right")
 IDS = {"setpoint": ("10A", "12A"), "speed": ("100", "120"), "status": ("101", "121"), "force": ("200", "220"), "offset": ("201", "221")}

@@ -11,6 +11,9 @@ import subprocess
 import tempfile
 import unittest
 
+import pytest
+
+pytestmark = pytest.mark.exact
 PROGRAM = os.path.join(os.environ["IWHEEL_BUILD"], "app", "ctl", "iwheelctl")
 GOLDEN = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "recordings")
 SECOND = "(1760000000.{:06d}) can0 {}\n"

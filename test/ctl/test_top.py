@@ -16,6 +16,7 @@ from harness import Rig, find_program
 from operator_at_terminal import Operator
 
 pyte = pytest.importorskip("pyte")  # PyPI, requirements/check.txt
+pytestmark = pytest.mark.native("a screen: in the kernel of the tests its first test does not end")
 BUILD = os.environ["IWHEEL_BUILD"]
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The image of an STM32F103 with one file changed, and one scenario of the emulated board."""
+"""The image of a board with one file changed, and one scenario of the emulated board."""
 
 import re
 import shutil
@@ -10,13 +10,19 @@ from pathlib import Path
 from table import ROOT, Broken
 
 TARGET, PORT, APPLICATION, SERVER = (ROOT / name for name in ("test/target", "port/stm32_stub", "app/board", "lib/northbound/server/src"))
-DRIVER_FILES = ("bxcan.c", "bxcan_filters.c", "frame_ring.c")
+CPUS = {"f1": "cortex-m3", "f4": "cortex-m4", "g4": "cortex-m4"}
+OF_ANOTHER = {"pins_g4.c": "pins_f4.c", "serial_dma_g4.c": "serial_dma_f1.c"}  # A family has these files in common with another one.
 IMAGE_FILES = (
-    *DRIVER_FILES,
+    "bxcan.c",
+    "bxcan_filters.c",
+    "can_bxcan.c",
+    "can_groups.c",
     "board_clock.c",
     "board_clock_f1.c",
     "cortex_m.c",
     "estop.c",
+    "fault.c",
+    "frame_ring.c",
     "lamp.c",
     "main.c",
     "marker.c",
@@ -56,9 +62,19 @@ def must(command):
         raise Broken(f"does not build: {done.stderr[-1500:]}")
 
 
+def name_for(family, name):
+    """The file of that family in the place of one of STM32F103."""
+    name = name.replace("_f1.", f"_{family}.")
+    name = OF_ANOTHER.get(name, name)
+    return name.replace("bxcan", "fdcan") if family == "g4" else name
+
+
 def judge(work, applied, folder, image, scenario):
-    """The finding of the scenario, or None. `work`: the folder that test/target has built."""
+    """The finding of the scenario, or None. `work`: the folder that test/target has built; `image`: KIND or BOARD/KIND."""
     work = Path(work).resolve()
+    board, _, image = f"stm32f103/{image}".rpartition("/")
+    board = board.rpartition("/")[2]
+    family = board[5:7]
     shutil.copytree(PORT, folder)
     for place in (APPLICATION, SERVER):
         shutil.copytree(place, folder, dirs_exist_ok=True)
@@ -66,7 +82,7 @@ def judge(work, applied, folder, image, scenario):
     (folder / (ROOT / applied.file).relative_to(home)).write_text(applied.text)
     flags = [
         "arm-none-eabi-gcc",
-        "-mcpu=cortex-m3",
+        f"-mcpu={CPUS[family]}",
         "-mthumb",
         "-mfloat-abi=soft",
         "-Os",
@@ -78,35 +94,36 @@ def judge(work, applied, folder, image, scenario):
         "-fno-tree-loop-distribute-patterns",
         f"-I{folder}",
         f"-I{folder / 'access'}",
-        f"-I{folder / 'boards/stm32f103'}",
+        f"-I{folder / 'boards' / board}",
         f"-I{ROOT / 'core/include'}",
         f"-I{ROOT / 'lib/northbound/protocol/include'}",
         f"-I{ROOT / 'lib/northbound/server/include'}",
         f"-DIWHEEL_SETPOINT_TYPE_IS_SET={'false' if image == 'listen' else 'true'}",
         "-DIWHEEL_SETPOINT_TYPE_VALUE=1",
         '-DIWHEEL_VERSION="0.0.0"',
+        *(["-DBRD_FLASH_PAGE_WORDS=4096U"] if family == "f4" else []),
         "-DIWHEEL_TRACK_MM_VALUE=540",
         f"-DIWHEEL_CURRENT_ROLE_VALUE={'IW_ROLE_UNSET' if image == 'listen' else 'IW_ROLE_LIMIT'}",
     ]
     source = {"listen": "none"}.get(image, image)
     (folder / "images").mkdir()
     talk = GATEWAY_FILES if image == "gateway" else ALONE_FILES
-    libraries = [work / "stm32f103" / name for name in ("lib/northbound/protocol/libiwheel_northbound.a", "core/libiwheel_core.a")]
+    libraries = [work / board / name for name in ("lib/northbound/protocol/libiwheel_northbound.a", "core/libiwheel_core.a")]
     must(
         [
             *flags,
-            *(folder / name for name in (*IMAGE_FILES, *talk, f"commander_{source}.c")),
+            *(folder / name_for(family, name) for name in (*IMAGE_FILES, *talk, f"commander_{source}.c")),
             *libraries,
             "--specs=nano.specs",
             "-nostartfiles",
             f"-L{folder}",
-            f"-T{folder / 'boards/stm32f103/memory.ld'}",
+            f"-T{folder / 'boards' / board / 'memory.ld'}",
             "-Wl,--gc-sections",
             "-o",
-            folder / f"images/stm32f103-{image}.elf",
+            folder / f"images/{board}-{image}.elf",
         ]
     )
-    done = run([sys.executable, TARGET / "emulate.py", work / "libmodel.so", folder / f"images/stm32f103-{image}.elf", scenario])
+    done = run([sys.executable, TARGET / "emulate.py", work / "libmodel.so", folder / f"images/{board}-{image}.elf", scenario])
     found = re.search(r"FAIL: (.*)", done.stdout)
     if done.stdout != "ok\n" and not found:
         raise Broken(f"the scenario cannot be judged: {(done.stdout + done.stderr)[-1500:]}")

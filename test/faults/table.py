@@ -17,7 +17,7 @@ NOTICERS, each of which must notice the fault:
     wp, wp:FUNCTION          the proof of that function (default: the function of the patch) fails
     eva                      Frama-C Eva raises an alarm
     fuzz:TARGET              the fuzz target finds it
-    image:KIND.SCENARIO      a scenario of the emulated STM32F103 with the image KIND
+    image:KIND.SCENARIO      a scenario of the emulated STM32F103 with the image KIND; BOARD/KIND for another board
     python:FILE              the tests of python/tests/FILE fail with a copy of the Python client
     anything else            a name of CTest, or a regular expression for one
 """

@@ -5,7 +5,7 @@
 #include <cstdio>
 #include <utility>
 
-static iwc_result_t drive(iwheel::Client gateway) {
+static iwc_result_t drive(iwheel::Client &gateway) {
     iwc_state_t state;
     iwc_message_t message;
     iwc_result_t result = gateway.connect();
@@ -24,9 +24,10 @@ static iwc_result_t drive(iwheel::Client gateway) {
 
 int main() {
     iwheel::Client gateway;
-    const iwc_result_t result = drive(std::move(gateway));
+    iwheel::Client moved = std::move(gateway);
+    const iwc_result_t result = drive(moved);
     if (result != IWC_OK) {
-        std::fprintf(stderr, "%s\n", iwc_words(result));
+        std::fprintf(stderr, "%s\n", moved.reason().c_str());
     }
     return (result == IWC_OK) ? 0 : 1;
 }

@@ -226,7 +226,7 @@ def board_reset(t):
     end_well(t, rig, client)
 
 
-@scenario("100 000 corrupted, cut, doubled and late lines move nothing", 14)
+@scenario("100 000 corrupted, cut, doubled and late lines move nothing", 14, native="a flood")
 def bad_lines(t):
     send_bad_lines(t, 100_000, 500)
 
@@ -357,7 +357,7 @@ def delayed(t):
     end_well(t, rig, await_service(t, rig))
 
 
-@scenario("commands faster than the line: each gets a reply, the newest is sent, none waits", 5)
+@scenario("commands faster than the line: each gets a reply, the newest is sent, none waits", 5, native="a flood")
 def too_fast(t):
     rig, client = begin(t)
     first_us = now_us()
@@ -375,7 +375,7 @@ def too_fast(t):
     end_well(t, rig, client)
 
 
-@scenario("a flood of requests of one client costs another neither lease nor stop", 6)
+@scenario("a flood of requests of one client costs another neither lease nor stop", 6, native="a flood")
 def flood(t):
     rig, client = begin(t)
     flooder = rig.client()
@@ -524,6 +524,18 @@ def explained_anew(t):
     for sent, words in troubles():
         with talking(theirs, sent):
             check_told(t, rig, sent, words, 8.0)
+    theirs.close()
+
+
+@scenario("a board that restarted after a fault: the relay logs cause and address", 4)
+def fault_of_the_board(t):
+    rig = t.rig()
+    ours, theirs = socket.socketpair()
+    rig.cable = Cable(rig.path("port"), ours)
+    rig.start_relay()
+    link = {"event": "link", "boot": "0123456789abcdef", "version": "0.3.0", "fault_cause": 0x0C000100, "fault_pc": 0x08001234}
+    with talking(theirs, framed(b"0 12 " + json.dumps(link).encode())):
+        t.check(rig.await_relay("fault: cause 0x0C000100 at 0x08001234; report both", 4.0), rig.gateway.text()[-400:])
     theirs.close()
 
 

@@ -2,13 +2,16 @@
 """What the image `gateway` must do: a host drives it over the serial line, and the line, the relay and the clients fail in every way."""
 
 import itertools
+import json
 import random
+from pathlib import Path
 
 import beginnings
 from emulator.can import LEFT
 from emulator.chip import MS, PINRSTF, US
 from host import Host, framed
 
+ROOT = Path(__file__).resolve().parent.parent.parent
 SECOND = 1000 * MS
 ZERO = (0, 2000)
 LEASE_NS, PERIOD_NS = 200 * MS, 20 * MS
@@ -249,44 +252,76 @@ FLOODS = {
     "config, no such key": {"cmd": "config", "key": "drive.lease", "value": 1},
     "config, discarded": {"cmd": "config", "commit": False},
     "config, committed in motion": {"cmd": "config", "commit": True},
-    "hello": {"cmd": "hello", "name": "a name as long as names may be"},
+    "hello": {"cmd": "hello"},
+    "hello, unknown field": {"cmd": "hello", "name": "a name as long as names may be"},
     "status": {"cmd": "status"},
     "watch": {"cmd": "watch", "topics": ["state", "stop", "estop", "force", "bus", "lease"], "rate_hz": 100},
     "why": {"cmd": "why"},
     "arm": {"cmd": "arm", "name": "again"},
+    "arm, takeover": {"cmd": "arm", "name": "again", "takeover": True},
+    "drive": lambda host, channel: host.quoted(channel, {"cmd": "drive", "left_mm_s": SPEED, "right_mm_s": SPEED}),
+    "drive, void": {"cmd": "drive", "left_mm_s": SPEED, "right_mm_s": SPEED},
+    "twist": lambda host, channel: host.quoted(channel, {"cmd": "twist", "v_mm_s": SPEED, "yaw_mrad_s": 0}),
+    "stop": {"cmd": "stop"},
+    "disarm": {"cmd": "disarm"},
+    "estop": {"cmd": "estop", "reason": "a reason that is as long as an operator in a hurry may write it"},
+    "release": {"cmd": "release"},
     "tare": {"cmd": "tare"},
     "confirm": {"cmd": "confirm", "item": "wheel_radius", "value": "192"},
+    "recordings": {"cmd": "recordings"},
+    "recording": {"cmd": "recording", "name": "20260101T000000Z-stop.iwr"},
     "reset": {"cmd": "reset"},
     "unknown": {"cmd": "nonsense"},
     "text that is no object": b'[1,2,{"cmd":"drive","left_mm_s":100}]',
     "bytes that are no text": bytes(range(128, 192)),
+    "relay: alive": {"cmd": "alive"},
+    "relay: open": {"cmd": "open", "channel": 3, "watch": True},
+    "relay: close": {"cmd": "close", "channel": 3},
+    "relay: link": {"cmd": "link"},
 }
+ENDS_MOTION = ("stop", "disarm", "estop", "relay: link")
+
+
+def flood(host, name, lines=40):
+    """At least 10 ms of the line, and more than the receive buffer: from the driver's channel and another, or from the relay."""
+    for turn in range(lines):
+        channel = 0 if name.startswith("relay: ") else 1 + turn % 2
+        message = FLOODS[name]
+        host.say(channel, message(host, channel) if callable(message) else message)
 
 
 def estop_in_floods(rig):
-    """The line is full of one kind of request, from the driver's channel and another: zero within 5 ms of the edge at any phase of the loop."""
+    """The line is full of one kind of request: zero within 5 ms of the edge at any phase of the loop. Every request of the protocol is a kind."""
+    requests = json.loads((ROOT / "share/northbound.json").read_text())["requests"]
+    missing = {*requests} - {name.split(",")[0] for name in FLOODS}
+    assert not missing, f"no flood of {missing}"
     host, chance, worst = start_driving(rig), random.Random(49), {}
-    host.open(2)
-    for name, message in FLOODS.items():
-        for _ in range(3):
+    for name in FLOODS:
+        host.open(2)
+        for _ in range(2):
             host.keep_driving(SPEED, 300)
-            for turn in range(40):  # At least 10 ms of the line, and more than the receive buffer.
-                host.say(2 if turn % 2 else 1, message)
+            flood(host, name)
             rig.run(2 * MS + chance.randrange(3000) * US)
-            assert rig.setpoints()[-1].setpoint()[0] == SPEED, "the wheels are not driven"
+            before = rig.setpoints()[-1].setpoint()
+            assert before[0] == SPEED or name in ENDS_MOTION, f"{name}: the wheels are not driven"
             rig.machine.board.drive("estop", None)
             pressed_ns = rig.machine.now_ns
             rig.run(60 * MS)
             host.listen()
-            zero = next(frame for frame in rig.setpoints(pressed_ns) if frame.setpoint() == ZERO)
-            worst[name] = max(worst.get(name, 0), zero.time_ns - pressed_ns)
-            assert not moving(rig, zero.time_ns), "motion after the e-stop"
+            if before != ZERO:
+                zero = next(frame for frame in rig.setpoints(pressed_ns) if frame.setpoint() == ZERO)
+                worst[name] = max(worst.get(name, 0), zero.time_ns - pressed_ns)
+                assert not moving(rig, zero.time_ns), f"{name}: motion after the e-stop"
+            assert not moving(rig, pressed_ns + EDGE_TO_ZERO_NS), f"{name}: motion after the e-stop"
             rig.machine.board.drive("estop", 0)
             rig.run(1900 * MS)
+            if name == "relay: link":
+                host.open(1)
             assert host.ask(1, {"cmd": "reset"}, 600)["ok"], host.lines[-1].message
             host.arm()
     late = {name: round(span_ns / MS, 2) for name, span_ns in worst.items() if span_ns > EDGE_TO_ZERO_NS}
     assert not late, f"first zero later than 5 ms after the edge, in ms: {late}"
+    assert {*FLOODS} - {*worst} <= {"estop"}, "a kind was never judged in motion"
     rig.note("edge to zero in ms at most: " + ", ".join(f"{name} {span_ns / MS:.2f}" for name, span_ns in worst.items()))
 
 
@@ -416,6 +451,20 @@ def power_cut_while_writing(rig):
     rig.note(f"{len(cuts)} cuts, {rig.machine.flash.erasures} erasures")
 
 
+def hardware_watchdog(rig):
+    """An option byte starts the watchdog at each reset: a start that erases a page completes it."""
+    machine, flash = rig.machine, rig.machine.flash
+    slots = 16 * 1024 if flash.unit == 4 else 1024
+    flash.memory[: slots - 256] = bytes(slots - 256)  # One slot of the first page is blank.
+    machine.watchdog.by_hardware, machine.watchdog.lsi_hz = True, machine.board.lsi_limits_hz[1]
+    machine.watchdog.reset()
+    rig.run(3 * SECOND)
+    host = start(rig)
+    assert flash.erasures == 1, f"{flash.erasures} erasures"
+    assert machine.watchdog.timeout_ns() < 200 * MS, "the period stayed extended"
+    host.arm()
+
+
 def stored_in_flash(rig):
     """The board stores observations of the wheels only after two seconds without setpoints, restores them with their provenance after
     power-off, and drops them with the setting for which they were found."""
@@ -485,6 +534,46 @@ def power_cut_while_learning(rig):
     rig.expect_resets(*(cause for _, cause in rig.machine.resets))
     assert known != "assumed", "nothing was ever stored"
     rig.note(f"{len(cuts)} cuts, {rig.machine.flash.erasures} erasures")
+
+
+def fault_of(host):
+    """(cause, address) of the event link, or None."""
+    events = host.events("link", 0)
+    return (events[-1]["fault_cause"], events[-1]["fault_pc"]) if "fault_cause" in events[-1] else None
+
+
+def fault_is_reported(rig):
+    """A fault in motion: zeros first, and the next starts report its cause and address, also after power-off. A fault that repeats itself does not wear
+    out the flash."""
+    host, machine = start_driving(rig), rig.machine
+    assert fault_of(host) is None
+
+    def fault(address):
+        while machine.active:
+            rig.run(US)
+        machine.cpu.reg_write(machine.PC, address)
+        machine.sleeping = False
+        rig.run(US)
+
+    fault(0x60000000)
+    failed_ns = machine.now_ns
+    host.begin_again()
+    zeros = rig.setpoints(failed_ns)
+    assert zeros[0].time_ns - failed_ns < 50 * MS and not moving(rig, failed_ns), "no zeros first"
+    assert fault_of(host) == (3 << 26 | 1 << 8, 0x60000000), fault_of(host)
+    operations = machine.flash.operations
+    rig.run(2 * SECOND)
+    fault(0x60000010)
+    host.begin_again()
+    assert fault_of(host) == (3 << 26 | 1 << 8, 0x60000010), "the newest fault is not reported"
+    assert machine.flash.operations == operations, "each fault is written to the flash"
+    machine.lose_power()
+    host.begin_again()
+    assert fault_of(host) == (3 << 26 | 1 << 8, 0x60000000), "the first fault did not survive power-off"
+    machine.lose_power()
+    host.begin_again()
+    assert fault_of(host) is None, "an old fault is reported for ever"
+    rig.expect_resets("software", "software", "power", "power")
 
 
 def bus_off_driven(rig):
@@ -594,6 +683,28 @@ def another_rate(rig):
     assert zero.time_ns - pressed_ns <= EDGE_TO_ZERO_NS and not moving(rig, zero.time_ns)
 
 
+def dma_errors(rig):
+    """A bus error disables a channel of the DMA. Receiving: it starts again within the lease, and the damage is reported. Sending: one line is cut."""
+    host, uart, dma = start_driving(rig), rig.machine.uart, rig.machine.dma
+    failed_ns = rig.machine.now_ns
+    dma.receive.fail()
+    host.keep_driving(SPEED, 600)
+    assert all(frame.setpoint()[0] == SPEED for frame in rig.setpoints(failed_ns)), "the board did not receive again"
+    assert host.events("line_error"), "the damage was not reported"
+    host.say(1, {"cmd": "status"})
+    while not dma.transmit.is_on() or dma.transmit.left < 1000:
+        rig.run(US)
+    dma.transmit.fail()
+    rig.run(2 * MS)
+    host.drive(SPEED, wait=False)
+    rig.run(10 * MS)
+    cut, *texts = (host.rest + bytes(uart.sent)).split(b"\n")
+    host.rest = b"\n".join(texts)
+    uart.sent.clear()
+    assert b'"ok":true' in cut and len(texts) >= 1, "no line was cut"
+    assert host.drive(SPEED)["ok"] and host.ask(1, {"cmd": "status"})["state"] == "armed", "the board does not send any more"
+
+
 def crowd(rig):
     """Eight clients watch and send requests continuously: the driver drives, replies precede events, losses are reported."""
     host = start(rig)
@@ -637,9 +748,12 @@ SCENARIOS = (
     power_cut_while_writing,
     stored_in_flash,
     power_cut_while_learning,
+    hardware_watchdog,
+    fault_is_reported,
     bus_off_driven,
     hostile_line,
     noise_on_the_wire,
+    dma_errors,
     crowd,
 )
 LONG = (both_words_and_turns, estop_random, estop_in_floods, hostile_line, crowd, reset_in_motion, nobody_feeds_another, power_cut_while_learning)

@@ -9,7 +9,8 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 WORK = ROOT / "build/target"
 STM32 = ROOT / "port/stm32_stub"
-CPUS = {"stm32f103": "cortex-m3", "stm32f407": "cortex-m4", "stm32f446": "cortex-m4"}
+MODELS = ("bxcan_model.c", "bxcan_model_receive.c", "fdcan_model.c", "block_hook.c")
+CPUS = {"stm32f103": "cortex-m3", "stm32f407": "cortex-m4", "stm32f446": "cortex-m4", "stm32g474": "cortex-m4"}
 CONFIGURED = ["-DIWHEEL_SETPOINT_TYPE=1", "-DIWHEEL_CURRENT_ROLE=limit", "-DIWHEEL_TRACK_MM=540"]
 OPTIONS = {
     "listen": [],
@@ -28,6 +29,7 @@ IMAGES = {
     "stm32f103": ("listen", "zero", "setpoint", "demo", "usb", "crystal12", "gateway", "gateway_slow", "gateway_fast"),
     "stm32f407": ("listen", "zero", "setpoint", "demo", "crystal", "gateway"),
     "stm32f446": ("zero", "clock", "demo", "gateway"),
+    "stm32g474": ("listen", "zero", "setpoint", "demo", "crystal", "gateway"),
 }
 
 
@@ -52,7 +54,7 @@ def configure(folder, cpu, options):
 
 
 def build_images():
-    """BOARD-IMAGE.elf of all in WORK/images, the last of each board as it is flashed in WORK/BOARD, and the model of their bus controller."""
+    """BOARD-IMAGE.elf of all in WORK/images, the last of each board as it is flashed in WORK/BOARD, and the models of their bus controllers."""
     (WORK / "images").mkdir(parents=True, exist_ok=True)
     for board, several in IMAGES.items():
         for image in several:
@@ -63,5 +65,4 @@ def build_images():
             must(["cmake", "--build", folder, "-j2"])
             shutil.copy(folder / f"port/stm32_stub/iwheel_{board}.elf", WORK / f"images/{board}-{image}.elf")
     # Without sanitizers: it is loaded into a Python that has none.
-    sources = [HERE / name for name in ("bxcan_model.c", "bxcan_model_receive.c", "block_hook.c")]
-    must(["gcc", "-std=c11", "-O2", "-shared", "-fPIC", "-o", WORK / "libmodel.so", *sources])
+    must(["gcc", "-std=c11", "-O2", "-shared", "-fPIC", "-o", WORK / "libmodel.so", *(HERE / name for name in MODELS)])

@@ -8,10 +8,10 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 FIELDS = {
-    "overruns": ("bus", "brd_bxcan_t", "overruns"),
-    "lost": ("bus", "brd_bxcan_t", "lost"),
-    "resets": ("bus", "brd_bxcan_t", "resets"),
-    "bus_offs": ("bus", "brd_bxcan_t", "bus_offs"),
+    "overruns": ("bus", "DRIVER", "overruns"),
+    "lost": ("bus", "DRIVER", "lost"),
+    "resets": ("bus", "DRIVER", "resets"),
+    "bus_offs": ("bus", "DRIVER", "bus_offs"),
     "received": ("gateway", "iw_gateway_t", "counters.received"),
     "bad_format": ("gateway", "iw_gateway_t", "counters.bad_format"),
     "unknown": ("gateway", "iw_gateway_t", "counters.unknown"),
@@ -21,9 +21,9 @@ FIELDS = {
 
 
 @functools.cache
-def offsets():
-    """{name: offset in its structure}; every one is an uint32_t."""
-    probe = '#include "bxcan.h"\n#include "iwheel/gateway.h"\n'
+def offsets(controller):
+    """{name: offset in its structure}; every one is an uint32_t. `controller`: bxcan or fdcan."""
+    probe = f'#define DRIVER brd_{controller}_t\n#include "{controller}.h"\n#include "iwheel/gateway.h"\n'
     probe += "".join(f"char offset_of_{name}[1 + offsetof({kind}, {field})];\n" for name, (_, kind, field) in FIELDS.items())
     command = ["arm-none-eabi-gcc", "-mcpu=cortex-m3", "-mthumb", "-S", "-xc", "-", "-o", "-"]
     command += [f"-I{ROOT / folder}" for folder in ("core/include", "port/stm32_stub", "port/stm32_stub/access")]
@@ -34,12 +34,12 @@ def offsets():
 def addresses(elf):
     """{name: address} of the fields in this image."""
     run = subprocess.run(["arm-none-eabi-nm", str(elf)], capture_output=True, text=True, check=True)
-    objects = {}
+    objects, controller = {}, "fdcan" if "stm32g4" in Path(elf).name else "bxcan"
     for line in run.stdout.splitlines():
         address, kind, name = line.rsplit(" ", 2)
         if kind in "bBdD":
             objects[name.split(".")[0]] = int(address, 16)
-    return {name: objects[FIELDS[name][0]] + offset for name, offset in offsets().items()}
+    return {name: objects[FIELDS[name][0]] + offset for name, offset in offsets(controller).items()}
 
 
 def stack_area(elf):

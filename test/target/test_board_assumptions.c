@@ -13,8 +13,8 @@ static uint32_t flash[BRD_FLASH_PAGES][BRD_FLASH_PAGE_WORDS];
 static unsigned operations, cut_after, erasures;
 static gateway_rig_t rig;
 
-const volatile uint32_t *brd_flash_page(unsigned page) {
-    return flash[page];
+uint32_t brd_flash_read(unsigned page, unsigned word) {
+    return flash[page][word];
 }
 
 bool brd_flash_erase(unsigned page) {
@@ -151,10 +151,12 @@ TEST(test_learned_small_changes_need_no_record) {
     TEST_ASSERT_TRUE(brd_assumptions_differs(&now, &stored));
 }
 
+static const brd_fault_t no_fault = {0, 0};
+
 static brd_records_t power_on(void) {
     brd_records_t stored = {.power_ons = 0};
     cut_after = UINT32_MAX;
-    brd_records_open(&stored, true, false);
+    brd_records_open(&stored, true, false, no_fault);
     return stored;
 }
 
@@ -195,17 +197,42 @@ TEST(test_learned_last_blank_slot_is_reserved_for_settings) {
     TEST_ASSERT_TRUE(brd_records_commit(&stored, &settings));
     TEST_ASSERT_EQUAL_UINT(0, erasures);
     const uint32_t power_ons = stored.power_ons;
-    brd_records_open(&stored, false, true); // Wheels may be turning: no slow operation starts.
+    brd_records_open(&stored, false, true, no_fault); // Wheels may be turning: no slow operation starts.
     TEST_ASSERT_EQUAL_UINT(0, erasures);
-    brd_records_open(&stored, false, false);
+    brd_records_open(&stored, false, false, no_fault);
     TEST_ASSERT_EQUAL_UINT(1, erasures);
     TEST_ASSERT_EQUAL_UINT(3, brd_store_blank(&stored.store));
     TEST_ASSERT_EQUAL_UINT32(power_ons, stored.power_ons);
     brd_assumptions_t read;
     brd_settings_t found;
     TEST_ASSERT_TRUE(brd_records_assumptions(&stored, &read) && brd_records_settings(&stored, &found));
-    brd_records_open(&stored, false, false);
+    brd_records_open(&stored, false, false, no_fault);
     TEST_ASSERT_EQUAL_UINT_MESSAGE(1, erasures, "each start would erase");
+}
+
+TEST(test_records_store_the_first_fault_of_a_power_on) {
+    const brd_fault_t first = {0x0C000100U, 0x08001234U};
+    const brd_fault_t second = {0x0C008200U, 0x08004321U};
+    brd_records_t stored = power_on();
+    TEST_ASSERT_EQUAL_HEX32(0, stored.fault.cause);
+    operations = 0;
+    brd_records_open(&stored, false, true, first);
+    TEST_ASSERT_GREATER_THAN_UINT(0, operations);
+    operations = 0;
+    for (unsigned repeated = 0; repeated < 100U; repeated++) {
+        brd_records_open(&stored, false, (repeated & 1U) != 0U, second);
+        TEST_ASSERT_EQUAL_MEMORY(&second, &stored.fault, sizeof second);
+    }
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(0, operations, "each fault wears the flash");
+    brd_records_open(&stored, false, false, no_fault);
+    TEST_ASSERT_EQUAL_MEMORY(&first, &stored.fault, sizeof first);
+    stored = power_on();
+    TEST_ASSERT_EQUAL_MEMORY(&first, &stored.fault, sizeof first);
+    stored = power_on();
+    TEST_ASSERT_EQUAL_HEX32_MESSAGE(0, stored.fault.cause, "an old fault is reported");
+    brd_records_open(&stored, false, true, second);
+    stored = power_on();
+    TEST_ASSERT_EQUAL_MEMORY(&second, &stored.fault, sizeof second);
 }
 
 /// A record of version 0.2 has 26 values: its 18 numbers, type, role, five switches, track. Other keys were added

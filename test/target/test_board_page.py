@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The table of pins in docs/user/stm32.md, and the addresses and names of its commands that flash, are those of the boards.
+"""The tables of pins in docs/user/stm32.md and board.md, and the addresses and names of the commands that flash, are those of the boards. The table of
+the LED is that of lamp.h.
 
 The pins are asked of the compiler (boards/BOARD/board.h, board_pins.h), the address of memory.ld. A row that is not true is printed as it must be.
 """
@@ -12,7 +13,9 @@ import pytest
 from images import ROOT, STM32
 
 PAGE = ROOT / "docs/user/stm32.md"
-PRESETS = {"stm32f103": "arm-m3", "stm32f407": "arm", "stm32f446": "arm"}
+STEPS, STEPS_BOARDS = ROOT / "docs/user/board.md", ("stm32f446", "stm32f103", "stm32g474")
+LAMP = STM32 / "lamp.h"
+PRESETS = {"stm32f103": "arm-m3", "stm32f407": "arm", "stm32f446": "arm", "stm32g474": "arm"}
 PINS = {
     "e-stop": "BRD_ESTOP",
     "button": "BRD_BUTTON",
@@ -50,19 +53,43 @@ def rows():
         if what == "lamp":
             cells = [f"{cell}, lit by {'a high' if known[board]['lit'] else 'a low'} level" for cell, board in zip(cells, PRESETS, strict=True)]
         if what.startswith("CAN"):
-            cells = [f"{cell}; {pin(other[what])} with `IWHEEL_CAN_PINS=PA11`" for cell in cells]
+            cells = [cell if cell == pin(other[what]) else f"{cell}; {pin(other[what])} with `IWHEEL_CAN_PINS=PA11`" for cell in cells]
         yield f"| {what} | " + " | ".join(cells) + " |"
     yield "| core, APB1 | " + " | ".join(f"{known[board]['core']}, {known[board]['apb1']} MHz" for board in PRESETS) + " |"
 
 
-def commands():
-    for board, preset in PRESETS.items():
+def files(boards):
+    for board in boards:
+        preset = PRESETS[board]
         image = f"build/{preset}/port/stm32_stub/iwheel_{board}"
         address = re.search(r"flash.*ORIGIN = (0x[0-9A-F]+)", (STM32 / f"boards/{board}/memory.ld").read_text())[1]
-        yield from (f"{image}.bin {address}\n", f"program {image}.elf verify", f"--download {image}.hex ", f"cmake --preset {preset}")
+        yield from (f"{image}.bin {address}\n", f"cmake --preset {preset}")
+
+
+def commands():
+    yield from files(PRESETS)
+    for board, preset in PRESETS.items():
+        image = f"build/{preset}/port/stm32_stub/iwheel_{board}"
+        yield from (f"program {image}.elf verify", f"--download {image}.hex ")
+
+
+def steps():
+    """Beginnings of the rows of board.md, and its commands."""
+    known = {board: facts(board) for board in STEPS_BOARDS}
+    usb = dict.fromkeys(STEPS_BOARDS, " (in the USB plug)") | {"stm32f103": ""}
+    for what in ("CAN receive", "CAN transmit", "e-stop", "serial, from the chip", "serial, to the chip"):
+        yield f"| {what} | " + " | ".join(pin(known[board][what]) + (usb[board] if "serial" in what else "") for board in STEPS_BOARDS) + " | "
+    yield from (f"| {lamp} | {state} | " for lamp, state in re.findall(r"^/// \| (\S.*?) +\| (\S.*?) +\|$", LAMP.read_text(), re.MULTILINE)[1:])
+    yield from files(STEPS_BOARDS)
 
 
 @pytest.mark.exact
 def test_page_has_the_boards_pins_and_files():
     page = PAGE.read_text()
     assert [text for text in (*rows(), *commands()) if text not in page] == []
+
+
+@pytest.mark.exact
+def test_steps_have_the_boards_pins_files_and_lamp():
+    page = STEPS.read_text()
+    assert [text for text in steps() if text not in page] == []

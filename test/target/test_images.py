@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The images of the three boards on an emulated Cortex-M: scenarios.py, gateway_scenarios.py. What is long and the same on both families runs on the first
+"""The images of the four boards on an emulated Cortex-M: scenarios.py, gateway_scenarios.py. What is long and the same on all families runs on the first
 board only, unless IWHEEL_FULL is 1. It also checks the files next to each image, which flashing tools need.
 """
 
@@ -28,7 +28,7 @@ def cases():
                 groups.setdefault((board, image, scenarios.OSCILLATOR.get(scenario), beginnings.of(scenario)), []).append(scenario)
     for (board, image, *begins), several in sorted(groups.items(), key=lambda group: -len(group[1])):
         for scenario in several:
-            long = [pytest.mark.full] if board == "stm32f407" and scenario in scenarios.LONG else []
+            long = [pytest.mark.full] if scenario in scenarios.LONG_ON.get(board, ()) else []
             marks = [pytest.mark.together(f"{board}-{image}.{several[0].__name__}"), *long]
             yield pytest.param(board, image, *begins, scenario, id=f"{board}-{image}.{scenario.__name__}", marks=marks)
 

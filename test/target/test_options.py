@@ -11,9 +11,20 @@ from images import CPUS, HERE, ROOT, STM32, configure, must, run
 
 pytestmark = [pytest.mark.exact, pytest.mark.limit(3000)]
 CLOCKS_THAT_CAN = (8, 16, 24, 32, 40, 48)
+CLOCKS_OF_FDCAN = (8, 16, 24, 32, 40, 48, 64, 80, 120, 160)
 CLOCKS_THAT_CANNOT = (1, 12, 20, 28, 30, 36, 42, 45, 50, 54)
-CRYSTALS_THAT_CAN = {"stm32f103": (4, 6, 8, 12, 16), "stm32f407": (*range(4, 27), 12.5, 19.2), "stm32f446": (8, 12, 16, 24, 25, 26)}
-CRYSTALS_THAT_CANNOT = {"stm32f103": (3, 5, 7, 9, 10, 11, 13, 14, 15, 20, 25), "stm32f407": (3, 27, 11.0592, 14.7456, 24.576), "stm32f446": (2, 32)}
+CRYSTALS_THAT_CAN = {
+    "stm32f103": (4, 6, 8, 12, 16),
+    "stm32f407": (*range(4, 27), 12.5, 19.2),
+    "stm32f446": (8, 12, 16, 24, 25, 26),
+    "stm32g474": (4, 5, 8, 10, 12, 16, 20, 24, 25, 45, 48),
+}
+CRYSTALS_THAT_CANNOT = {
+    "stm32f103": (3, 5, 7, 9, 10, 11, 13, 14, 15, 20, 25),
+    "stm32f407": (3, 27, 11.0592, 14.7456, 24.576),
+    "stm32f446": (2, 32),
+    "stm32g474": (2, 6, 9, 26, 52),
+}
 REFUSALS = {  # Options, and what the message must say.
     "-DIWHEEL_SETPOINT_TYPE=256 -DIWHEEL_CURRENT_ROLE=limit": "number from 0 to 255",
     "-DIWHEEL_SETPOINT_TYPE=one -DIWHEEL_CURRENT_ROLE=limit": "number from 0 to 255",
@@ -28,21 +39,28 @@ REFUSALS = {  # Options, and what the message must say.
     "-DIWHEEL_CAN_PINS=PD0": "it must be PB8 (receive PB8, transmit PB9) or PA11",
     "-DIWHEEL_GATEWAY=ON -DIWHEEL_BAUD=1M": "it must be a number from 115200 to 2000000",
     "-DIWHEEL_GATEWAY=ON -DIWHEEL_DEMO=ON -DIWHEEL_SETPOINT_TYPE=1 -DIWHEEL_CURRENT_ROLE=limit": "one of the two commands",
-    "-DIWHEEL_BOARD=stm32f999": "must be one of: stm32f103;stm32f407;stm32f446",
+    "-DIWHEEL_BOARD=stm32f999": "must be one of: stm32f103;stm32f407;stm32f446;stm32g474",
     "-DIWHEEL_BOARD=stm32f407": "has no cortex-m3",
     "-DIWHEEL_SETPOINT_TYPE=1 -DIWHEEL_CURRENT_ROLE=setpoint -DIWHEEL_DEMO=ON": "IWHEEL_DEMO needs",
 }
 PAGE = re.findall(r"^```c\n(?:// (\w+\.[ch])\n)?(.*?)^```", (ROOT / "docs/developer/porting.md").read_text(), re.MULTILINE | re.DOTALL)
 
 
-def compile_probe(clock_mhz, out):
-    flags = ["-std=c11", "-Wall", "-Wextra", "-Werror", f"-I{ROOT / 'core/include'}", f"-I{STM32}", f"-I{STM32 / 'boards/stm32f103'}"]
+def compile_probe(clock_mhz, out, board="stm32f103"):
+    flags = ["-std=c11", "-Wall", "-Wextra", "-Werror", f"-I{ROOT / 'core/include'}", f"-I{STM32}", f"-I{STM32 / 'boards' / board}"]
     return run(["gcc", *flags, f"-DBRD_APB1_HZ={clock_mhz}000000U", HERE / "timing_probe.c", ROOT / "core/src/bit_timing.c", "-o", out])
 
 
 @pytest.mark.parametrize("mhz", CLOCKS_THAT_CAN)
 def test_bus_clock_leads_to_the_exact_bit_rate(mhz, tmp_path):
     done = compile_probe(mhz, tmp_path / "probe")
+    assert done.returncode == 0, done.stderr
+    must([tmp_path / "probe"])
+
+
+@pytest.mark.parametrize("mhz", CLOCKS_OF_FDCAN)
+def test_clock_of_fdcan_gives_the_bus_exactly(mhz, tmp_path):
+    done = compile_probe(mhz, tmp_path / "probe", "stm32g474")
     assert done.returncode == 0, done.stderr
     must([tmp_path / "probe"])
 
@@ -77,14 +95,15 @@ def test_crystal_without_exact_bus_rate_does_not_compile(board, mhz):
     assert done.returncode != 0 and "this crystal cannot give the bus exactly" in done.stderr
 
 
-@pytest.mark.parametrize(("board", "mhz"), [("stm32f103", 36), ("stm32f407", 42), ("stm32f446", 45)])
+@pytest.mark.parametrize(("board", "mhz"), [("stm32f103", 36), ("stm32f407", 42), ("stm32f446", 45), ("stm32g474", 170)])
 def test_image_does_not_compile_with_the_usual_bus_clock(board, mhz):
     options = {"SETPOINT_TYPE_VALUE": "0", "SETPOINT_TYPE_IS_SET": "false", "CURRENT_ROLE_VALUE": "IW_ROLE_UNSET", "TRACK_MM_VALUE": "0"}
-    done = check_source(board, "main.c", f"-DBRD_APB1_HZ={mhz}000000U", *(f"-DIWHEEL_{name}={value}" for name, value in options.items()))
+    source = "can_fdcan.c" if board == "stm32g474" else "can_bxcan.c"
+    done = check_source(board, source, f"-DBRD_APB1_HZ={mhz}000000U", *(f"-DIWHEEL_{name}={value}" for name, value in options.items()))
     assert done.returncode != 0 and f"{mhz}" in done.stderr and "multiple of 8 MHz" in done.stderr
 
 
-@pytest.mark.parametrize(("board", "warned"), [("stm32f103", True), ("stm32f407", True), ("stm32f446", False)])
+@pytest.mark.parametrize(("board", "warned"), [("stm32f103", True), ("stm32f407", True), ("stm32f446", False), ("stm32g474", False)])
 def test_whose_pins_are_the_usb_sockets_is_warned(board, warned, tmp_path):
     done = configure(tmp_path, CPUS[board], [f"-DIWHEEL_BOARD={board}", "-DIWHEEL_CAN_PINS=PA11"])
     assert done.returncode == 0 and ("PA11 and PA12 are the USB socket's" in " ".join(done.stderr.split())) == warned, done.stderr

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#define memcpy       small_memcpy
 #define memmove      small_memmove
 #define memset       small_memset
 #define memcmp       small_memcmp
@@ -14,6 +15,7 @@
 #define strchr       small_strchr
 #define __udivmoddi4 small_divide
 #include "small.c"
+#undef memcpy
 #undef memmove
 #undef memset
 #undef memcmp
@@ -48,6 +50,10 @@ TEST(test_small_memory_functions_equal_the_library) {
         TEST_ASSERT_EQUAL_INT(sign(memcmp(mine + from, mine + to, size)),
                               sign(small_memcmp(mine + from, mine + to, size)));
         TEST_ASSERT_EQUAL_PTR(mine + to, small_memmove(mine + to, mine + from, size));
+        memmove(theirs + to, theirs + from, size);
+        TEST_ASSERT_EQUAL_UINT8_ARRAY(theirs, mine, SIZE);
+        const uint8_t *const source = theirs; // Another array: memcpy's do not overlap.
+        TEST_ASSERT_EQUAL_PTR(mine + to, small_memcpy(mine + to, source + from, size));
         memmove(theirs + to, theirs + from, size);
         TEST_ASSERT_EQUAL_UINT8_ARRAY(theirs, mine, SIZE);
         TEST_ASSERT_EQUAL_PTR(mine + from, small_memset(mine + from, (int)i, size));

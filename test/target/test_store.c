@@ -14,8 +14,8 @@ static unsigned erasures;
 static bool is_dead;     ///< No operation is executed any more.
 static uint32_t torn_by; ///< Bits of the cut operation that were written.
 
-const volatile uint32_t *brd_flash_page(unsigned page) {
-    return flash[page];
+uint32_t brd_flash_read(unsigned page, unsigned word) {
+    return flash[page][word];
 }
 
 static bool is_cut(void) {

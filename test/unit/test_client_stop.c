@@ -92,6 +92,11 @@ static void test_ask_arm_returns_the_key_of_the_lease(void) {
     TEST_ASSERT_EQUAL_STRING("", key);
 }
 
+static void test_reason_without_connection_is_not_empty(void) {
+    TEST_ASSERT_EQUAL_STRING(iwc_words(IWC_CLOSED), iwc_reason(gateway));
+    TEST_ASSERT_GREATER_THAN(3, strlen(iwc_reason(NULL)));
+}
+
 // Either socket -------------------------------------------------------------------------------------------------------
 
 /// Starts a process of a gateway that answers each connection to this socket with `reply` after its first line.
@@ -177,6 +182,7 @@ int main(void) {
     TEST_ASSERT_EQUAL_INT(0, mkdir(watch, 0755));
     RUN_TEST(test_ask_helpers_send_time_stop_and_key);
     RUN_TEST(test_ask_arm_returns_the_key_of_the_lease);
+    RUN_TEST(test_reason_without_connection_is_not_empty);
     RUN_TEST(test_stop_at_sends_its_line_without_a_greeting);
     RUN_TEST(test_stop_at_missing_socket_uses_the_other_one);
     RUN_TEST(test_stop_at_full_socket_uses_the_other_one);

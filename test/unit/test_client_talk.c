@@ -172,6 +172,42 @@ TEST(test_ask_refusal_has_error_and_reason) {
     TEST_ASSERT_GREATER_OR_EQUAL(0, iwc_fd(gateway));
 }
 
+TEST(test_ask_refusal_without_message_has_a_reason) {
+    send_text("{\"id\":2,\"ok\":false,\"error\":\"denied\",\"message\":\"\"}\n");
+    TEST_ASSERT_EQUAL(IWC_REFUSED, iwc_reset(gateway, SOON));
+    TEST_ASSERT_EQUAL_STRING("the gateway refused without a message: denied; see its log", iwc_reason(gateway));
+    send_text("{\"id\":4,\"ok\":false}\n");
+    TEST_ASSERT_EQUAL(IWC_REFUSED, iwc_reset(gateway, SOON));
+    TEST_ASSERT_EQUAL_STRING("the gateway refused without a message: no name of an error; see its log",
+                             iwc_reason(gateway));
+}
+
+TEST(test_reason_is_that_of_the_last_failed_call) {
+    char path[200];
+    memset(path, 'x', sizeof path);
+    path[sizeof path - 1U] = '\0';
+    TEST_ASSERT_EQUAL_STRING(iwc_words(IWC_OK), iwc_reason(gateway)); // Connected, and no call has failed.
+    TEST_ASSERT_EQUAL(IWC_TIMEOUT, iwc_next(gateway, 0, &message));   // This is no failure.
+    TEST_ASSERT_EQUAL_STRING(iwc_words(IWC_OK), iwc_reason(gateway));
+    TEST_ASSERT_EQUAL(IWC_TIMEOUT, iwc_reset(gateway, 1));
+    TEST_ASSERT_EQUAL_STRING(iwc_words(IWC_TIMEOUT), iwc_reason(gateway));
+    TEST_ASSERT_EQUAL(IWC_INVALID, iwc_watch(gateway, 0, 0, SOON));
+    TEST_ASSERT_EQUAL_STRING(iwc_words(IWC_INVALID), iwc_reason(gateway));
+    send_text("{\"id\":4,\"ok\":false,\"error\":\"busy\",\"message\":\"wait\"}\n");
+    TEST_ASSERT_EQUAL(IWC_REFUSED, iwc_reset(gateway, SOON));
+    send_text("{\"id\":6,\"ok\":true}\n");
+    TEST_ASSERT_EQUAL(IWC_OK, iwc_reset(gateway, SOON)); // A call that succeeds changes nothing.
+    TEST_ASSERT_EQUAL_STRING("wait", iwc_reason(gateway));
+    (void)close(server);
+    server = -1;
+    TEST_ASSERT_EQUAL(IWC_CLOSED, iwc_next(gateway, SOON, &message));
+    TEST_ASSERT_EQUAL_STRING(iwc_words(IWC_CLOSED), iwc_reason(gateway));
+    TEST_ASSERT_EQUAL(IWC_NOT_THERE, iwc_connect(gateway, "/nonexistent/x.sock", 0));
+    TEST_ASSERT_EQUAL_STRING(iwc_words(IWC_NOT_THERE), iwc_reason(gateway));
+    TEST_ASSERT_EQUAL(IWC_INVALID, iwc_stop_at(gateway, path, 0));
+    TEST_ASSERT_EQUAL_STRING(iwc_words(IWC_INVALID), iwc_reason(gateway));
+}
+
 TEST(test_ask_refusal_without_id_ends_the_pending_request) {
     send_text("{\"id\":null,\"ok\":false,\"error\":\"bad_json\",\"message\":\"\"}\n");
     TEST_ASSERT_EQUAL(IWC_REFUSED, iwc_reset(gateway, SOON));

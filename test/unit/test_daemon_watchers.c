@@ -39,6 +39,7 @@ static const right_t rights[IWN_CMDS] = {
     [IWN_CMD_WHY] = {"{\"cmd\":\"why\"}", true},
     [IWN_CMD_RECORDINGS] = {"{\"cmd\":\"recordings\"}", true},
     [IWN_CMD_RECORDING] = {"{\"cmd\":\"recording\",\"name\":\"none.rec\",\"offset\":0}", true},
+    [IWN_CMD_RECORD] = {"{\"cmd\":\"record\",\"on\":true}", true},
     [IWN_CMD_CONFIG] = {"{\"cmd\":\"config\"}", false},
     [IWN_CMD_CONFIRM] = {"{\"cmd\":\"confirm\",\"item\":\"track\",\"value\":\"540\"}", false},
 };

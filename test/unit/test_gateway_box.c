@@ -360,7 +360,7 @@ TEST(test_rotation_cost_per_recording_is_constant) {
             TEST_ASSERT_EQUAL(0, close(fd));
         }
         calls = 0;
-        gw_box_files_rotate(directory, &(gw_box_limits_t){8, UINT64_MAX, counts[i] + 1U, true});
+        gw_box_files_rotate(directory, &(gw_box_limits_t){8, UINT64_MAX, counts[i] + 1U, true, 0});
         TEST_ASSERT_LESS_OR_EQUAL(3UL * counts[i] + 100UL, calls);
         TEST_ASSERT_EQUAL(8U * GW_BOX_ENDINGS, count_files());
     }
@@ -372,7 +372,7 @@ TEST(test_rotation_of_33000_recordings_retains_motion) {
     const int directory = open_in_memory();
     make_recordings(1, 3, 500);
     make_recordings(4, 33000, 0);
-    gw_box_files_rotate(directory, &(gw_box_limits_t){8, UINT64_MAX, 33000, false});
+    gw_box_files_rotate(directory, &(gw_box_limits_t){8, UINT64_MAX, 33000, false, 0});
     TEST_ASSERT_EQUAL(8, count_files());
     TEST_ASSERT_TRUE(is_there("stop-000001-made.jsonl"));
     TEST_ASSERT_TRUE(is_there("stop-000003-made.jsonl"));
@@ -384,7 +384,7 @@ TEST(test_rotation_of_33000_recordings_retains_motion) {
 TEST(test_recording_of_a_single_file_can_be_dropped) {
     const int directory = gw_box_files_open(config.record.directory);
     make_recordings(1, 1, 0);
-    TEST_ASSERT_TRUE(gw_box_files_drop_oldest(directory, 2, false));
+    TEST_ASSERT_TRUE(gw_box_files_drop_oldest(directory, &(gw_box_limits_t){.below = 2}));
     TEST_ASSERT_EQUAL(0, count_files());
     (void)close(directory);
 }
@@ -506,11 +506,11 @@ TEST(test_oldest_recording_is_dropped_only_below_the_number) {
     record("a", 0);
     record("b", 0);
     const int directory = gw_box_files_open(config.record.directory);
-    TEST_ASSERT_TRUE(gw_box_files_drop_oldest(directory, 2, true));
-    TEST_ASSERT_FALSE(gw_box_files_drop_oldest(directory, 2, true));
+    TEST_ASSERT_TRUE(gw_box_files_drop_oldest(directory, &(gw_box_limits_t){.below = 2, .in_motion = true}));
+    TEST_ASSERT_FALSE(gw_box_files_drop_oldest(directory, &(gw_box_limits_t){.below = 2, .in_motion = true}));
     TEST_ASSERT_EQUAL(3, count_files());
     TEST_ASSERT_EQUAL(3, gw_box_files_next(directory));
-    gw_box_files_rotate(directory, &(gw_box_limits_t){0, 0, 2, true}); // The newest always stays.
+    gw_box_files_rotate(directory, &(gw_box_limits_t){0, 0, 2, true, 0}); // The newest always stays.
     TEST_ASSERT_EQUAL(3, count_files());
     (void)close(directory);
 }

@@ -41,6 +41,38 @@ static void assert_refused(const iw_drive_t *request, iw_refusal_t expected) {
     TEST_ASSERT_EQUAL_MEMORY(&target, &rig.gateway.setpoint.target, sizeof target);
 }
 
+TEST(test_refusal_text_exists_for_every_refusal) {
+    static const char *const words[IW_REFUSALS] = {
+        [IW_REFUSE_NONE] = "not refused",
+        [IW_REFUSE_OUT_OF_RANGE] = "outside its range",
+        [IW_REFUSE_MISSING_FIELD] = "no currents",
+        [IW_REFUSE_NOT_HOLDER] = "stop it first",
+        [IW_REFUSE_BUSY] = "takeover",
+        [IW_REFUSE_NOT_ARMED] = "arm first",
+        [IW_REFUSE_LATCHED] = "latched",
+        [IW_REFUSE_ESTOP_PRESSED] = "e-stop",
+        [IW_REFUSE_BUS_DOWN] = "the bus is down",
+        [IW_REFUSE_TIMING_MISMATCH] = "sample point",
+        [IW_REFUSE_WHEEL_LOST] = "telemetry",
+        [IW_REFUSE_WHEEL_BLOCKED] = "did not follow",
+        [IW_REFUSE_PAIR_DIVERGES] = "left its path",
+        [IW_REFUSE_NOT_AT_REST] = "standstill; wait",
+        [IW_REFUSE_SEND_STALLED] = "acknowledged",
+        [IW_REFUSE_SECOND_MASTER] = "another device",
+        [IW_REFUSE_CAUSE_PRESENT] = "a cause of a stop",
+        [IW_REFUSE_TYPE_NOT_SET] = "setpoint_type",
+        [IW_REFUSE_TRACK_NOT_SET] = "track_mm",
+        [IW_REFUSE_STALE_COMMAND] = "too recently",
+        [IW_REFUSE_LISTEN_ONLY] = "listen only",
+        [IW_REFUSE_CONTRADICTED] = "contradicts",
+    };
+    for (int i = 0; i < IW_REFUSALS; i++) {
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(iw_refusal_text((iw_refusal_t)i), words[i]), words[i]);
+    }
+    TEST_ASSERT_NOT_NULL(strstr(iw_refusal_text(IW_REFUSALS), "no text"));
+    TEST_ASSERT_NOT_NULL(strstr(iw_refusal_text((iw_refusal_t)-1), "no text"));
+}
+
 TEST(test_gateway_drive_out_of_range_is_refused_completely) {
     static const iw_drive_t requests[] = {{{32768, 0}, {0, 0}, false},        {{0, -32769}, {0, 0}, false},
                                           {{100, INT32_MAX}, {0, 0}, false},  {{INT32_MIN, 100}, {0, 0}, false},

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The web bridge on simulated wheels: what it answers, to whom, what it costs the gateway (test_bridge.py), and its page in a real browser (test_browser.py).
+"""The web bridge on simulated wheels: what it answers, to whom, what it costs the gateway (test_bridge.py), and its page in two real browsers.
 
-The browser is Debian's chromium by PyPI's playwright; the judge of accessibility axe-core (scripts/web_assets --test). What is missing is skipped, and
+The browsers are Debian's chromium by PyPI's playwright (test_browser.py, test_first_screen.py), and Debian's firefox-esr by WebDriver BiDi
+(test_firefox.py); the judge of accessibility axe-core (scripts/web_assets --test). What is missing is skipped, and
 said so.
 """
 

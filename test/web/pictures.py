@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Makes the pictures of docs/user/web.md, with a machine that drives.
+"""Makes the pictures of docs/user/web.md, with a machine that drives; with --all those for a review instead: four sizes, both browsers.
 
-usage: test/web/pictures.py BUILD FOLDER
+usage: test/web/pictures.py [--all] BUILD FOLDER
 """
 
 import sys
@@ -12,14 +12,15 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE), str(HERE.parent / "system")]
 
+from firefox import firefox_page
 from test_browser import SIZES, live, page_of
+from test_first_screen import VIEWS, touch
 from trials import Driver
 from web_rig import WebRig
 
 
 def take_pictures(build, folder):
-    folder.mkdir(parents=True, exist_ok=True)
-    for size in SIZES:
+    for size in ("desk", "phone"):
         for scheme in ("light", "dark"):
             rig = WebRig(build)
             try:
@@ -38,5 +39,35 @@ def take_pictures(build, folder):
                 rig.close()
 
 
+def take_all(build, folder):
+    """First screens of a latched machine; the whole page in Chromium."""
+    rig = WebRig(build, driving=True)
+    try:
+        rig.start().connected()
+        driver = Driver(rig, 300)
+        rig.ask("POST", "/api/record?on=true")
+        time.sleep(2)
+        rig.sim.ask("estop press")
+        driver.end()
+        time.sleep(3)
+        for scheme in ("light", "dark"):
+            for size in VIEWS:
+                with page_of(rig, size, scheme, **touch(size)) as page:
+                    live(page)
+                    time.sleep(1)
+                    page.screenshot(path=folder / f"chromium-{size}-{scheme}.png")
+                    page.screenshot(path=folder / f"chromium-{size}-{scheme}-whole.png", full_page=True)
+            with firefox_page(rig.url, *SIZES["portrait"], scheme) as page:
+                page.seen("document.querySelector('#news').className === 'good'")
+                for size in VIEWS:
+                    page.size(*SIZES[size])
+                    time.sleep(1)
+                    page.picture(folder / f"firefox-{size}-{scheme}.png")
+    finally:
+        rig.close()
+
+
 if __name__ == "__main__":
-    take_pictures(Path(sys.argv[1]), Path(sys.argv[2]))
+    *options, where, into = sys.argv[1:]
+    Path(into).mkdir(parents=True, exist_ok=True)
+    (take_all if options == ["--all"] else take_pictures)(Path(where), Path(into))

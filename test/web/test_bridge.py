@@ -29,7 +29,7 @@ from trials import ROOT, Driver, Skip, braking_ms, longest_gap_ms, until
 from web_rig import Person, free_port
 
 ROUTES = ("/api/status", "/api/events", "/api/stops", "/api/recordings", "/api/recording?name=a.log", "/api/fleet", "/metrics", "/health")
-PROVED = ("/api/estop", "/api/arm", "/api/drive", "/api/reset")  # STOP needs no proof.
+PROVED = ("/api/estop", "/api/arm", "/api/drive", "/api/reset", "/api/record")  # STOP needs no proof.
 COMMANDS = ("/api/stop", *PROVED)
 
 
@@ -1257,3 +1257,25 @@ def test_fleet_serves_only_the_file_of_iwheel_fleet(rig):
         if source.is_dir():
             source.rmdir()
             source.touch()
+
+
+def test_record_on_request_writes_until_it_is_ended(rig):
+    """On the socket for watching: it moves nothing. The secret for reading does not suffice."""
+    rig.start().connected()
+    headers = {"Authorization": f"Bearer {rig.read_secret}"}
+    assert rig.ask("POST", "/api/record?on=true", headers=headers, token="")[0] == 401
+    assert [rig.ask("POST", f"/api/record{query}")[0] for query in ("", "?on=1", "?on=true%22")] == [400] * 3
+    assert not rig.ask_json("GET", "/api/recordings")[1]["on_request"]["on"]
+    status, answer = rig.ask_json("POST", "/api/record?on=true")
+    assert status == 200 and answer["on"] and answer["most_ms"] == 600_000, answer
+
+    def listed(on):
+        found = rig.ask_json("GET", "/api/recordings")[1]
+        entry = [one for one in found["recordings"] if one["cause"] == "requested"]
+        return found["on_request"]["on"] is on and bool(found["on_request"]["ended"]) is not on and entry and entry[0]["log_bytes"] > 10_000 and entry[0]
+
+    name = until(lambda: listed(True), 5, "frames are on the disk")["name"]
+    assert rig.ask_json("POST", "/api/record?on=false")[1]["on"] is False
+    until(lambda: listed(False), 5, "it has ended")
+    lines = Path(rig.path(f"{name}.jsonl")).read_text(encoding="ascii").splitlines()
+    assert json.loads(lines[-1])["type"] == "end", lines[-1]

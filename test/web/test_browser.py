@@ -67,7 +67,7 @@ def decimal(value, digits, unit):
 def wheel_words(wheel):
     """Written here once more, from docs/user/northbound.md, not from the page."""
     words = {
-        "heard": "NOT HEARD" if not wheel["heard"] else "at rest" if wheel["at_rest"] else "turning",
+        "heard": "OFFLINE" if not wheel["heard"] else "at standstill" if wheel["at_rest"] else "turning",
         "measured": decimal(wheel["speed_mm_s"], 0, "mm/s"),
         "wanted": decimal(wheel["commanded_mm_s"], 0, "mm/s"),
         "told": decimal(wheel["applied_mm_s"], 0, "mm/s"),
@@ -91,7 +91,7 @@ def compare(state, read):
     assert state["estop"]["line"] in read["estop"] and state["estop"]["state"] in read["estop"] and "SIMULATED" in read["estop"]
     assert all(str(state["bus"][key]) in read["bus"] for key in ("name", "state", "timing", "echo"))
     holder = state["lease"]["holder"]
-    assert ("nobody drives" in read["lease"]) == (holder is None)
+    assert ("no client drives" in read["lease"]) == (holder is None)
     assert holder is None or all(str(state["lease"][key]) in read["lease"] for key in ("name", "holder", "pid", "remaining_ms", "lease_ms"))
     assert str(state["budget"]["client_lost_ms"]) in read["budget"] and f"{state['budget']['killed_mm'] / 1000:.3f} m" in read["budget"]
     for side in ("left", "right"):
@@ -127,8 +127,8 @@ def test_every_element_shows_the_snapshot_of_the_same_moment(rig):
         compare(*page.evaluate(READ))
         assert "then: iwheelctl reset" in page.text_content("#advice")
         driver.end()
-        seen(page, "document.querySelectorAll('#stops details').length === 1 && document.querySelectorAll('#recordings li').length === 1")
-        page.click("#stops summary")
+        seen(page, "document.querySelectorAll('#stops h3').length === 1 && document.querySelectorAll('#recordings li').length === 1")
+        page.click("#stops [aria-expanded]")
         seen(page, "document.querySelectorAll('#stops svg .rx').length > 5 && document.querySelectorAll('#stops svg .tx').length > 1")
         assert page.locator("#stops table tbody tr").count() >= 40
 
@@ -374,6 +374,28 @@ def test_plots_follow_freeze_zoom_and_are_saved(rig):
                 assert all(line.count(",") == 3 and float(line.split(",")[0]) > 0 for line in lines[1:])
                 assert any(line.split(",")[3] not in ("", "0") for line in lines[1:]), "it was driven"
     driver.end()
+
+
+def test_recording_is_begun_and_ended_by_the_page(rig):
+    rig.start().connected()
+    with page_of(rig, "phone") as page:
+        live(page)
+        page.wait_for_selector("#record:visible")
+        assert page.inner_text("#record") == "Start a recording"
+        page.click("#record")
+        seen(page, "document.querySelector('#record').textContent === 'End the recording'")
+        seen(page, "/: [1-9]\\d+ kB\\. It ends after 10 minutes or 16 MB/.test(document.querySelector('#record-says').textContent)")
+        page.click("#record")
+        seen(page, "document.querySelector('#record').textContent === 'Start a recording' && document.querySelector('#record-says').textContent === ''")
+        seen(page, "document.querySelector('#recordings h3')?.textContent === 'Recorded on request'")
+        with page.expect_download() as download:
+            page.click("#recordings [data-ending='log']")
+        path = Path(rig.path("requested.log"))
+        download.value.save_as(path)
+        assert path.stat().st_size > 10_000
+        page.click("#recordings button:text-is('Open')")
+        page.wait_for_selector("#player:not([hidden])")
+        assert abs(float(page.input_value("#at"))) <= 0.01, "0 is its begin"
 
 
 def fleet_row(name, **other):

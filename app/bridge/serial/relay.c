@@ -5,6 +5,7 @@
 #include "iwheel_linux/clock.h"
 
 #include <errno.h>
+#include <inttypes.h>
 #include <signal.h>
 #include <stdio.h>
 #include <string.h>
@@ -74,6 +75,11 @@ static int open_port(relay_t *self) {
 static void greet(relay_t *self) {
     sock_log(&self->log, SOCK_LOG_INFO, "board on %s: start %s, version %s", self->settings->board.port,
              self->link.boot, (self->link.version[0] != '\0') ? self->link.version : "unknown");
+    if (self->link.fault_cause != 0) {
+        sock_log(&self->log, SOCK_LOG_WARNING,
+                 "the board restarted after a fault: cause 0x%08" PRIX32 " at 0x%08" PRIX32 "; report both numbers",
+                 (uint32_t)self->link.fault_cause, (uint32_t)self->link.fault_pc);
+    }
     self->backoff_us = BACKOFF_MIN_US;
     self->trouble[0] = '\0';
     relay_drop_clients(self);

@@ -46,6 +46,13 @@ static bool is_boot(const char *text) {
     return strlen(text) == IWN_LINE_BOOT && strspn(text, "0123456789abcdef") == IWN_LINE_BOOT;
 }
 
+/// Returns 0 if there is no such integer.
+static int64_t whole(iwn_json_t event, const char *name) {
+    iwn_json_t value;
+    return (iwn_json_find(event, name, &value) && iwn_json_kind(value) == IWN_JSON_INTEGER) ? iwn_json_integer(value)
+                                                                                            : 0;
+}
+
 /// Handles the event `link`. Another boot id is another board, or the same after a reset.
 static serial_news_t take_link(serial_link_t *self, iwn_json_t event) {
     char boot[IWN_LINE_BOOT + 1U];
@@ -56,6 +63,8 @@ static serial_news_t take_link(serial_link_t *self, iwn_json_t event) {
     if (!iwn_json_find(event, "version", &value) || !iwn_json_text(value, self->version, sizeof self->version)) {
         self->version[0] = '\0';
     }
+    self->fault_cause = whole(event, "fault_cause");
+    self->fault_pc = whole(event, "fault_pc");
     if (self->state == SERIAL_LINKED && strcmp(boot, self->boot) == 0) {
         return SERIAL_NEWS_NONE;
     }

@@ -46,6 +46,8 @@ typedef struct {
     serial_link_state_t state;
     char boot[IWN_LINE_BOOT + 1U];
     char version[33];
+    int64_t fault_cause; ///< Fault that ended an earlier run of the board (fault.h of the port); 0: none.
+    int64_t fault_pc;
     uint64_t received_us; ///< Time of the last good line, or of opening the port.
     serial_stamp_t stamp[SERIAL_STAMPS];
     unsigned stamps; ///< Number of stamps since the boot id is known.

@@ -110,7 +110,7 @@ static enum MHD_Result send_challenge(web_call_t *self) {
     char text[160];
     const char *nonce = web_proofs_nonce(&self->server->proofs, self->server->now_us);
     if (nonce == NULL) {
-        return web_call_refuse(self, 503, "no_random", "the kernel gives no random numbers; see dmesg");
+        return web_call_refuse(self, 503, "no_random", "the kernel has no random numbers; see dmesg");
     }
     const int length =
         snprintf(text, sizeof text, "{\"ok\":true,\"nonce\":\"%s\",\"boot\":\"%s\"}\n", nonce, self->server->boot);

@@ -18,11 +18,12 @@ typedef struct {
 } figure_t;
 
 static const figure_t wheel_figures[] = {
-    {"heard", "iwheel_wheel_heard", "1: its speed is heard", 0, false, true},
+    {"heard", "iwheel_wheel_heard", "1: its speed is received", 0, false, true},
     {"speed_mm_s", "iwheel_wheel_speed_meters_per_second", "Measured", 3, false, false},
     {"commanded_mm_s", "iwheel_wheel_commanded_meters_per_second", "What the client wants", 3, false, false},
-    {"applied_mm_s", "iwheel_wheel_applied_meters_per_second", "What the wheel was told last", 3, false, false},
-    {"applied_mA", "iwheel_wheel_applied_amperes", "Current that the wheel was told last", 3, false, false},
+    {"applied_mm_s", "iwheel_wheel_applied_meters_per_second", "Speed that the wheel was last commanded", 3, false,
+     false},
+    {"applied_mA", "iwheel_wheel_applied_amperes", "Current that the wheel was last commanded", 3, false, false},
     {"force_net_mN", "iwheel_wheel_force_newtons", "Net force, while it is valid", 3, false, false},
     {"force_offset_mN", "iwheel_wheel_force_offset_newtons", "Zero of the force", 3, false, false},
     {"battery_dV", "iwheel_wheel_battery_volts", "Of the wheel's battery", 1, false, false},
@@ -41,7 +42,7 @@ static const figure_t figures[] = {
     {"counters.echoes", "iwheel_frames_echoed", "Frames of ours seen on the bus", 0, true, false},
     {"counters.stray_echoes", "iwheel_frames_stray_echoes", "Echoes without a frame of ours", 0, true, false},
     {"counters.unknown", "iwheel_frames_unknown", "With an id that is none of the wheels'", 0, true, false},
-    {"counters.foreign", "iwheel_frames_foreign", "Setpoints from somebody else", 0, true, false},
+    {"counters.foreign", "iwheel_frames_foreign", "Setpoints of another sender", 0, true, false},
     {"counters.bad_format", "iwheel_frames_bad_format", "Of another format", 0, true, false},
     {"counters.bad_length", "iwheel_frames_bad_length", "Of another length", 0, true, false},
     {"counters.pairs", "iwheel_setpoint_pairs", "Sent", 0, true, false},
@@ -205,7 +206,7 @@ void web_metrics_write(const iwc_message_t *state, const web_own_t *own, const w
     write_head(out, "iwheel_build_info", "gauge", "1, with the version of iwheel-web");
     (void)fprintf(out, "iwheel_build_info{version=\"%s\"} 1\n", IWHEEL_VERSION);
 
-    write_head(out, "iwheel_up", "gauge", "1: the gateway tells its state");
+    write_head(out, "iwheel_up", "gauge", "1: the gateway reports its state");
     (void)fprintf(out, "iwheel_up %d\n", (state != NULL) ? 1 : 0);
     if (state != NULL) {
         write_state(state, out);

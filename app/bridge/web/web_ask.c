@@ -7,7 +7,7 @@
 #include <string.h>
 
 const char *const web_not_there =
-    "NOT DELIVERED: the gateway does not answer; see that it runs: systemctl status iwheel-gateway";
+    "NOT DELIVERED: the gateway does not answer; check that it runs: systemctl status iwheel-gateway";
 
 static void keep(web_call_t *self, unsigned status, const char *before, const char *text, size_t length) {
     const size_t head = strlen(before);
@@ -84,6 +84,15 @@ static enum MHD_Result ask_recording(web_call_t *self) {
     return ask(self, request);
 }
 
+static enum MHD_Result ask_record(web_call_t *self) {
+    const char *on = web_call_argument(self, "on");
+    const bool begins = on != NULL && strcmp(on, "true") == 0;
+    if (!begins && (on == NULL || strcmp(on, "false") != 0)) {
+        return web_call_refuse(self, 400, "bad_value", "on is true, to begin the recording, or false, to end it");
+    }
+    return ask(self, begins ? "{\"cmd\":\"record\",\"on\":true}" : "{\"cmd\":\"record\",\"on\":false}");
+}
+
 /// Writes the name of a page for messages.
 static void name_of(const web_call_t *self, char out[BRIDGE_NAME_SIZE]) {
     (void)snprintf(out, BRIDGE_NAME_SIZE, "web page %" PRIu64, self->session);
@@ -100,7 +109,7 @@ static const char *age_wrong(const web_call_t *self, int64_t *out_t_us) {
 
 static enum MHD_Result refuse_stick(web_call_t *self, const char *who) {
     char text[160];
-    (void)snprintf(text, sizeof text, "%s sends commands to turn the wheels; let go there first", who);
+    (void)snprintf(text, sizeof text, "%s sends commands to turn the wheels; release its control first", who);
     return web_call_refuse(self, 409, "stale_command", text);
 }
 
@@ -200,6 +209,8 @@ enum MHD_Result web_call_ask(web_call_t *self) {
         return ask(self, "{\"cmd\":\"recordings\"}");
     case WEB_RECORDING:
         return ask_recording(self);
+    case WEB_RECORD:
+        return ask_record(self);
     case WEB_STOP:
     case WEB_ESTOP:
         return ask_stop(self);

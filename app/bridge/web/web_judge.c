@@ -38,6 +38,7 @@ static const web_route_t routes[] = {
     {"GET", "/api/stops", WEB_STOPS, NULL, JSON},
     {"GET", "/api/recordings", WEB_RECORDINGS, NULL, JSON},
     {"GET", "/api/recording", WEB_RECORDING, NULL, JSON},
+    {"POST", "/api/record", WEB_RECORD, NULL, JSON},
     {"GET", "/api/fleet", WEB_FLEET, NULL, JSON},
     {"GET", "/metrics", WEB_METRICS, NULL, "application/openmetrics-text; version=1.0.0; charset=utf-8"},
     {"GET", "/health", WEB_HEALTH, NULL, JSON},
@@ -176,18 +177,19 @@ web_verdict_t web_judge(const web_rules_t *rules, const web_asked_t *asked) {
     bool other_method = false;
     const web_route_t *route = find_route(asked, &other_method);
     if (!is_our_name(rules, asked->host)) {
-        return refuse(421, "bad_host", "this machine is not called so: use its address, or list the name under hosts");
+        return refuse(421, "bad_host",
+                      "this is not a name of this machine: use its address, or list the name under hosts");
     }
     if (!is_our_page(asked) && !is_navigation(route, asked)) {
-        return refuse(403, "bad_origin", "another site's page asks: open the bridge's own page");
+        return refuse(403, "bad_origin", "the page of another site asks: open the page of this bridge");
     }
     if (asked->is_doubled) {
         return refuse(400, "bad_header",
-                      "Host, Content-Length, Transfer-Encoding or Authorization is there twice, or a name has a blank; "
+                      "Host, Content-Length, Transfer-Encoding or Authorization is sent twice, or a name has a blank; "
                       "send each once");
     }
     if (asked->has_body) {
-        return refuse(413, "no_body", "requests have no body here: what they say stands in the address");
+        return refuse(413, "no_body", "requests have no body here: the address has all fields");
     }
     if (!has_proof(route, asked)) {
         return (asked->proof == WEB_PROOF_OVER)

@@ -25,6 +25,7 @@ typedef enum {
     WEB_STOPS,
     WEB_RECORDINGS,
     WEB_RECORDING,
+    WEB_RECORD,
     WEB_FLEET,
     WEB_METRICS,
     WEB_HEALTH,

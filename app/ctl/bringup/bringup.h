@@ -14,6 +14,8 @@
 #include "doctor/doctor.h"
 #include "text/ctl_text.h"
 
+#include <setjmp.h>
+
 /// Wheels in the air turn slowly, but a direction can be seen; and briefly, but the operator has time to see it.
 #define BRINGUP_SPEED_MM_S  100
 #define BRINGUP_CURRENT_mA  500
@@ -50,6 +52,9 @@ typedef struct {
     int current_mA;
     double mm_per_tick; ///< From a pushed distance; 0: not known.
     trial_t trial;
+    jmp_buf disturbed; ///< Begin of the present step.
+    bool repeats;      ///< The present step can be repeated: bringup_fail offers it.
+    bool ending;       ///< The last question is being asked.
 } bringup_t;
 
 /// Reason why a count is not complete. A stall of this program or of the gateway is not a reason: wheels continue to
@@ -195,11 +200,27 @@ void bringup_write(bringup_t *self);
 
 // --- shared by the steps -----------------------------------------------------------------------------------------
 
-/// Ends the program because the operator wants to quit or there is no input any more: stops the trial gateway, removes
-/// its folder and writes nothing.
+/// Ends the program because there is no input any more: stops the trial gateway, removes its folder and writes nothing.
+_Noreturn void bringup_abandon(bringup_t *self);
+/// Ends the program because the operator wants to quit. Offers to save the confirmed results before.
 _Noreturn void bringup_quit(bringup_t *self);
-/// Ends the program in the same way because it cannot continue; the reason has been printed.
+/// The present step cannot continue; the reason has been printed. Offers to repeat the step; otherwise ends the program
+/// as bringup_quit does.
 _Noreturn void bringup_fail(bringup_t *self);
+
+// --- results of a bringup that ended early (bringup_resume.c) -----------------------------------------------------
+
+/// Writes the configuration with the notes to `path`. With `saved` the file can be continued with --from. Returns false
+/// after it has printed the reason of a failure.
+bool bringup_write_file(bringup_t *self, const char *path, bool saved);
+/// Writes the last line of a saved file: the checksum of the text before it.
+void bringup_print_mark(const char *text, size_t length, FILE *out);
+/// Reads the confirmed results of a saved file; a file that was changed since, or another one, has none.
+void bringup_read_saved(bringup_t *self, const char *path);
+/// Asks whether the results of the saved file are for these wheels.
+void bringup_resume(bringup_t *self);
+/// Returns true if all results of this step are confirmed.
+bool bringup_is_restored(const bringup_t *self, unsigned step);
 
 /// Returns a burst of both wheels forwards, with current, to try the setpoint type.
 burst_t bringup_ahead(const bringup_t *self, unsigned for_ms);

@@ -85,7 +85,7 @@ void talk_ask(bringup_t *self, const char *question, const char *otherwise, char
     (void)fflush(stdout);
     if (!read_line(out_answer, BRINGUP_ANSWER_SIZE)) {
         (void)puts("");
-        bringup_quit(self);
+        bringup_abandon(self);
     }
     trim(out_answer);
     if (out_answer[0] == '\0') {

@@ -5,6 +5,7 @@
 #include <errno.h>
 #include <stdarg.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <time.h>
@@ -97,24 +98,19 @@ static bool put_in_place(const char *beside, const char *path) {
     return rename(beside, path) == 0;
 }
 
-/// Writes a file next to `path` and moves it to `path`.
-static bool write_file(bringup_t *self, const char *path) {
-    commenter_t commenter = {.bringup = self};
-    commenter_t *const context = &commenter;
+/// Writes the text to a file next to `path` and moves it to `path`.
+static bool write_text(const char *path, const char *text, size_t length, bool saved) {
     char beside[512];
-    struct tm local;
-    const time_t now = time(NULL);
     (void)snprintf(beside, sizeof beside, "%.500s.new", path);
-    if (localtime_r(&now, &local) != NULL) {
-        (void)strftime(commenter.date, sizeof commenter.date, "%Y-%m-%d", &local);
-    }
     FILE *file = fopen(beside, "we");
     if (file == NULL) {
         talk_say("Cannot write %s: %s. Choose another file.", beside, strerror(errno));
         return false;
     }
-    print_head(commenter.date, file);
-    gateway_config_print_noted(&self->config, comment, (const void *)&context, file);
+    (void)fwrite(text, 1, length, file);
+    if (saved) {
+        bringup_print_mark(text, length, file);
+    }
     const bool written = fflush(file) == 0 && ferror(file) == 0 && fsync(fileno(file)) == 0;
     if (fclose(file) != 0 || !written || !put_in_place(beside, path)) {
         talk_say("Cannot write %s: %s. Choose another file.", path, strerror(errno));
@@ -122,6 +118,29 @@ static bool write_file(bringup_t *self, const char *path) {
         return false;
     }
     return true;
+}
+
+bool bringup_write_file(bringup_t *self, const char *path, bool saved) {
+    commenter_t commenter = {.bringup = self};
+    commenter_t *const context = &commenter;
+    struct tm local;
+    const time_t now = time(NULL);
+    char *text = NULL;
+    size_t length = 0;
+    if (localtime_r(&now, &local) != NULL) {
+        (void)strftime(commenter.date, sizeof commenter.date, "%Y-%m-%d", &local);
+    }
+    FILE *memory = open_memstream(&text, &length);
+    if (memory == NULL) {
+        (void)ctl_fail(CTL_INTERNAL, "out of memory");
+        return false;
+    }
+    print_head(commenter.date, memory);
+    gateway_config_print_noted(&self->config, comment, (const void *)&context, memory);
+    const bool complete = fclose(memory) == 0;
+    const bool written = complete && write_text(path, text, length, saved);
+    free(text);
+    return written;
 }
 
 static const char *value_of(const bringup_t *self, const bringup_note_t *note, char out_value[32]) {
@@ -219,7 +238,7 @@ void bringup_write(bringup_t *self) {
     do {
         talk_ask(self, "Write it to", self->out_path, path);
     } while ((access(path, F_OK) == 0 && !talk_yes(self, "That file exists. Replace it?", false)) ||
-             !write_file(self, path));
+             !bringup_write_file(self, path, false));
     talk_say("Written to %s.", path);
     tell_next(self, path);
 }

@@ -57,6 +57,7 @@ static int configure(bringup_t *self, const words_t *words) {
         return code;
     }
     bringup_forget_wiring(self);
+    bringup_read_saved(self, words->from);
     self->recording = words->learn;
     if (words->learn != NULL && access(words->learn, R_OK) != 0) {
         return ctl_fail(CTL_USAGE, "--learn %s: %s; use a recording in candump's form", words->learn, strerror(errno));
@@ -92,18 +93,76 @@ _Noreturn static void end(bringup_t *self, const char *told) {
     exit(ctl_finish(CTL_NO));
 }
 
-void bringup_quit(bringup_t *self) {
+void bringup_abandon(bringup_t *self) {
     end(self, "Ended. Nothing was written.");
 }
 
+static unsigned count_confirmed(const bringup_t *self) {
+    unsigned count = 0;
+    for (unsigned i = 0; i < self->notes; i++) {
+        count += (self->note[i].item != NULL) ? 1U : 0U;
+    }
+    return count;
+}
+
+/// Saves the confirmed results if there are any and the operator wants it, and ends the program.
+_Noreturn static void end_with_offer(bringup_t *self) {
+    char path[BRINGUP_ANSWER_SIZE];
+    char question[2U * BRINGUP_ANSWER_SIZE];
+    const unsigned count = self->ending ? 0U : count_confirmed(self);
+    self->ending = true;
+    self->repeats = false;
+    trial_stop(self); // No wheel turns during the question.
+    (void)snprintf(path, sizeof path, "%.100s.part", self->out_path);
+    (void)snprintf(question, sizeof question, "Save the %u confirmed results to %s, to continue later?", count, path);
+    if (count == 0U || !talk_yes(self, question, true) || !bringup_write_file(self, path, true)) {
+        bringup_abandon(self);
+    }
+    talk_say("Saved. To continue: iwheelctl bringup %s --from %s", self->out_path, path);
+    end(self, "Ended. The configuration is not complete, and was not written.");
+}
+
+void bringup_quit(bringup_t *self) {
+    if (signals_count() > 0U) {
+        bringup_abandon(self);
+    }
+    end_with_offer(self);
+}
+
 void bringup_fail(bringup_t *self) {
-    end(self, "Nothing was written.");
+    talk_keys_end();
+    if (signals_count() > 0U) {
+        bringup_abandon(self);
+    }
+    if (self->repeats && talk_yes(self, "This step was disturbed. Do it again?", true)) {
+        longjmp(self->disturbed, 1);
+    }
+    end_with_offer(self);
+}
+
+/// A step, and its number; 0: it has none.
+typedef struct {
+    void (*run)(bringup_t *self);
+    unsigned number;
+} step_t;
+
+/// Runs the step until it is done. bringup_fail leads back to its begin if the operator wants to repeat it.
+static void run_step(bringup_t *self, const step_t *step) {
+    if (bringup_is_restored(self, step->number)) {
+        talk_step(step->number, "confirmed by the earlier bringup; left out");
+        return;
+    }
+    (void)setjmp(self->disturbed);
+    self->repeats = step->number > 1U && step->number < BRINGUP_STEPS;
+    step->run(self);
+    self->repeats = false;
 }
 
 int verb_bringup(ctl_t *self, int count, char **words) {
-    static void (*const steps[])(bringup_t *) = {
-        introduce,     bringup_checks, bringup_estop,  bringup_gear,  bringup_type,  bringup_role,
-        bringup_signs, bringup_force,  bringup_radius, bringup_track, bringup_write,
+    static const step_t steps[] = {
+        {introduce, 0},     {bringup_resume, 0}, {bringup_checks, 1}, {bringup_estop, 2},
+        {bringup_gear, 3},  {bringup_type, 4},   {bringup_role, 5},   {bringup_signs, 6},
+        {bringup_force, 7}, {bringup_radius, 8}, {bringup_track, 9},  {bringup_write, BRINGUP_STEPS},
     };
     static bringup_t bringup;
     words_t parsed;
@@ -115,7 +174,7 @@ int verb_bringup(ctl_t *self, int count, char **words) {
     if (code == CTL_OK) {
         signals_catch();
         for (size_t i = 0; i < sizeof steps / sizeof steps[0]; i++) {
-            steps[i](&bringup);
+            run_step(&bringup, &steps[i]);
         }
         trial_close(&bringup);
     }

@@ -46,12 +46,14 @@ typedef struct {
     const char *path; ///< NULL: a name made of the time.
     const char *bus;  ///< NULL if the option is absent.
     int64_t for_us;   ///< 0: until a signal.
+    const char *disk; ///< "on" or "off": the recording on the gateway's disk; NULL if the option is absent.
 } words_t;
 
 static int parse(words_t *self, int count, char **words) {
     const option_t options[] = {
         {OPTION("--for", option_time, &self->for_us), .range = {FOR_MIN_US, FOR_MAX_US}},
         {OPTION("--can", option_text, &self->bus), .wants = "a bus: can0, or unix:PATH"},
+        {OPTION("--gateway", option_text, &self->disk), .wants = "on or off"},
         {.name = NULL},
     };
     const words_syntax_t syntax = {"record", options, words_is_file, &self->path};
@@ -318,11 +320,34 @@ static int finish(recorder_t *self, bool json, int code) {
                : ctl_fail(CTL_UNAVAILABLE, "%s: cannot be written: %s; free some space", self->name, strerror(why));
 }
 
+/// Begins or ends the recording on the gateway's disk, and prints its state.
+static int ask_gateway(ctl_t *ctl, const words_t *words) {
+    json_t *reply = NULL;
+    const bool on = strcmp(words->disk, "on") == 0;
+    if (!on && strcmp(words->disk, "off") != 0) {
+        return ctl_fail(CTL_USAGE, "--gateway \"%s\": write on or off", words->disk);
+    }
+    if (words->path != NULL || words->bus != NULL || words->for_us != 0) {
+        return ctl_fail(CTL_USAGE, "record --gateway writes on the gateway's disk: omit FILE, --for and --can");
+    }
+    const int code = ctl_ask(ctl, json_pack("{s:s,s:b}", "cmd", "record", "on", on ? 1 : 0), &reply);
+    if (code == CTL_OK && !ctl->json) {
+        (void)puts(on ? "recording on the gateway's disk, at most 10 min or 16 MiB; to end it: iwheelctl record "
+                        "--gateway off"
+                      : "the recording on the gateway's disk ends; its files have the cause \"requested\"");
+    }
+    json_decref(reply);
+    return code;
+}
+
 int verb_record(ctl_t *self, int count, char **words) {
     words_t parsed = {0};
     recorder_t recorder = {.wall_minus_us = wall_minus_us()};
     const bool json = self->json;
     int code = parse(&parsed, count, words);
+    if (code == CTL_OK && parsed.disk != NULL) {
+        return ask_gateway(self, &parsed);
+    }
     if (code == CTL_OK && json && parsed.path != NULL && strcmp(parsed.path, "-") == 0) {
         return ctl_fail(CTL_USAGE, "record writes the recording or --json to standard output, not both; name a FILE");
     }

@@ -79,6 +79,7 @@ static int port_receive(void *context, iw_can_frame_t *out_frame) {
     }
     *out_frame = self->frame[self->received++];
     compare_echo(self, out_frame);
+    replay_samples_frame(self, out_frame);
     return 1;
 }
 
@@ -167,6 +168,7 @@ void replay_step(replay_t *self, iw_time_us_t at_us) {
         echo_what_was_sent(self);
     }
     replay_report_step(self);
+    replay_samples_step(self);
 }
 
 static void count(replay_score_t *score, bool same) {

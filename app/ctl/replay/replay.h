@@ -26,8 +26,19 @@ typedef struct {
 /// Output stream and form.
 typedef struct {
     FILE *file;
-    bool json; ///< One object per line instead of text.
+    bool json;            ///< One object per line instead of text.
+    uint32_t samples_us;  ///< Samples instead of decisions, at least this long apart; 0: decisions.
+    bool frames_only;     ///< Samples of a recording without requests and states: these are unknown.
+    int64_t wall_less_us; ///< Times of samples are those of the core plus this.
 } replay_out_t;
+
+/// The setpoints of the recording, for samples.
+typedef struct {
+    iw_time_us_t due_us;          ///< Time of the next sample.
+    iw_time_us_t at_us[IW_SIDES]; ///< Time of the last setpoint of a wheel.
+    int16_t speed_mm_s[IW_SIDES]; ///< Its speed, in the machine's frame.
+    bool known[IW_SIDES];         ///< There was one.
+} replay_samples_t;
 
 typedef struct {
     iw_gateway_t gateway;
@@ -47,6 +58,7 @@ typedef struct {
     uint32_t answers;
     uint32_t answered;
     bool echoes; ///< For a time without recorded echoes: each sent frame returns as its echo.
+    replay_samples_t samples;
     // Values that were printed, so that only changes are printed.
     bool quiet;    ///< Nothing is printed.
     bool compares; ///< Echoes are compared with sent frames.
@@ -113,6 +125,20 @@ void replay_report_answer(const replay_t *self, const blackbox_entry_t *entry);
 
 /// Prints a recorded decision that differs from the present one.
 void replay_report_difference(const replay_t *self, const blackbox_entry_t *entry);
+
+// --- samples: a table of both wheels in SI units (replay_samples.c) --------------------------------------------------
+
+/// Prints the names of the columns. The unit is the last part of a name.
+void replay_samples_begin(const replay_out_t *out);
+
+/// Stores the speed of a setpoint of the recording.
+void replay_samples_frame(replay_t *self, const iw_can_frame_t *frame);
+
+/// Prints a row if it is due.
+void replay_samples_step(replay_t *self);
+
+/// Prints a row with an event, between the samples.
+void replay_samples_event(const replay_t *self, iw_time_us_t at_us, const char *event, const char *text);
 
 /// Prints a remark without a time.
 __attribute__((format(printf, 2, 3))) void replay_note(const replay_out_t *out, const char *format, ...);

@@ -44,7 +44,9 @@ __attribute__((format(printf, 4, 5))) static void report(const replay_t *self, i
     (void)vsnprintf(text, sizeof text, format, list);
     va_end(list);
     name_event(what, event);
-    if (self->out.json) {
+    if (self->out.samples_us > 0U) {
+        replay_samples_event(self, at_us, event, text);
+    } else if (self->out.json) {
         put_object(&self->out, json_pack("{s:I,s:s,s:s}", "t_us", (json_int_t)since_us, "event", event, "text", text));
     } else {
         (void)fprintf(self->out.file, "%6" PRIu64 ".%06" PRIu64 "  %-10s ", since_us / 1000000U, since_us % 1000000U,
@@ -59,6 +61,10 @@ void replay_note(const replay_out_t *out, const char *format, ...) {
     va_start(list, format);
     (void)vsnprintf(text, sizeof text, format, list);
     va_end(list);
+    if (out->samples_us > 0U) {
+        text_line(stderr, "iwheelctl: %s", text); // A table has no remarks.
+        return;
+    }
     if (out->json) {
         put_object(out, json_pack("{s:s,s:s}", "event", "note", "text", text));
     } else {
@@ -257,6 +263,9 @@ static void sum_up_as_json(const replay_t *self) {
 }
 
 void replay_finish(const replay_t *self) {
+    if (self->out.samples_us > 0U) {
+        return;
+    }
     if (self->out.json) {
         sum_up_as_json(self);
         return;

@@ -3,11 +3,13 @@
 #include "recordings/events.h"
 #include "replay.h"
 #include "talk/ctl.h"
+#include "text/ctl_text.h"
 
 #include <errno.h>
 #include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 /// A longer gap without frames is cut to this.
@@ -35,6 +37,8 @@ typedef struct {
     iw_time_us_t group_us;
     bool group; ///< Frames wait for their step.
     uint64_t backwards;
+    bool samples;
+    int64_t size; ///< Size of the file in bytes; 0: unknown.
 } verb_replay_t;
 
 /// Replaces the ending of FILE.log. Returns false if the path has another ending or is too long.
@@ -52,6 +56,7 @@ static int parse_words(verb_replay_t *self, int count, char **words) {
     const option_t options[] = {
         {OPTION("--config", config_option_load, &self->config)},
         {OPTION("--interface", option_text, &self->recording.only)},
+        {OPTION("--samples", NULL, &self->samples)},
         {.name = NULL},
     };
     const words_syntax_t syntax = {"replay", options, words_is_file, &self->path};
@@ -68,6 +73,13 @@ static int find_config(verb_replay_t *self) {
         return CTL_OK;
     }
     const int fd = path_next_to(self->path, ".conf", path) ? source_open(self->ctl, path, SOURCE_WHOLE) : -1;
+    if (fd < 0 && self->samples) {
+        iw_config_default(&self->config);
+        return ctl_fail(CTL_OK,
+                        "%s: no configuration is next to it: signs and units of force are those of the wheels' "
+                        "document; name one: --config FILE",
+                        self->path);
+    }
     if (fd < 0) {
         return ctl_fail(CTL_USAGE, "%s: no configuration is next to it; name one: iwheelctl replay FILE --config FILE",
                         self->path);
@@ -97,7 +109,18 @@ static void flush_group(verb_replay_t *self) {
     }
 }
 
+/// Prints on a terminal how much of the file has been read, each 65536 frames.
+static void report_progress(const verb_replay_t *self) {
+    if (self->size > 0 && self->recording.frames % 65536U == 0U && text_live_columns(stderr) > 0U) {
+        const int64_t there = (int64_t)lseek(self->recording.fd, 0, SEEK_CUR);
+        (void)fprintf(stderr, "\r%3d %%\r", (int)(100 * there / self->size));
+    }
+}
+
 static bool peek_frame(verb_replay_t *self) {
+    if (!self->has_frame) {
+        report_progress(self);
+    }
     self->has_frame = self->has_frame || recording_next(&self->recording, &self->frame);
     return self->has_frame;
 }
@@ -182,8 +205,10 @@ static void name_things(verb_replay_t *self) {
 
 /// Replays exactly: steps, requests and answers at their recorded places.
 static void replay_exactly(verb_replay_t *self) {
-    replay_note(&self->out, "%s, with its requests and the port's answers; times in seconds from its first entry",
-                self->path);
+    if (!self->samples) {
+        replay_note(&self->out, "%s, with its requests and the port's answers; times in seconds from its first entry",
+                    self->path);
+    }
     if (peek_entry(self)) {
         replay_init(&self->replay, &self->config, self->entry.at_us, self->out);
         name_things(self);
@@ -219,6 +244,7 @@ static iw_time_us_t pass_time(verb_replay_t *self, iw_time_us_t at_us) {
         replay_note(&self->out, "nothing for %" PRIu64 " s; cut to %u s", (at_us - replay->now_us) / 1000000U,
                     GAP_US / 1000000U);
         self->cut_us += cut_us;
+        replay->out.wall_less_us += (int64_t)cut_us;
         at_us -= cut_us;
     }
     while (replay->next_us < at_us) {
@@ -229,10 +255,12 @@ static iw_time_us_t pass_time(verb_replay_t *self, iw_time_us_t at_us) {
 
 /// Replays frames only: no requests, the bus is up, the e-stop is released.
 static void replay_frames(verb_replay_t *self) {
-    replay_note(
-        &self->out,
-        "%s, frames only: no client arms. Setpoints marked T are the gateway's own, others another controller's",
-        self->path);
+    if (!self->samples) {
+        replay_note(
+            &self->out,
+            "%s, frames only: no client arms. Setpoints marked T are the gateway's own, others another controller's",
+            self->path);
+    }
     self->recording.even = true; // No entry of a monotonic clock corrects its times.
     if (peek_frame(self)) {
         replay_init(&self->replay, &self->config, time_of(self, &self->frame), self->out);
@@ -263,7 +291,22 @@ static int finish(verb_replay_t *self) {
     }
     const bool bad = self->events.bad > 0U;
     events_close(&self->events);
+    if (self->samples && self->recording.refused) {
+        return CTL_USAGE; // Unlike bad lines, which are left out: the table ends too early.
+    }
     return (code == CTL_OK && bad) ? CTL_DATA : code;
+}
+
+/// Interval of samples.
+#define SAMPLES_US 20000U
+
+static void begin_samples(verb_replay_t *self) {
+    struct stat status;
+    self->out.samples_us = SAMPLES_US;
+    self->out.frames_only = self->events.file == NULL;
+    self->out.wall_less_us = self->wall_minus_us;
+    self->size = (fstat(self->recording.fd, &status) == 0 && S_ISREG(status.st_mode)) ? (int64_t)status.st_size : 0;
+    replay_samples_begin(&self->out);
 }
 
 int verb_replay(ctl_t *self, int count, char **words) {
@@ -272,6 +315,9 @@ int verb_replay(ctl_t *self, int count, char **words) {
     replay.out = (replay_out_t){.file = stdout, .json = self->json};
     if (code != CTL_OK) {
         return code;
+    }
+    if (replay.samples && self->json) {
+        return ctl_fail(CTL_USAGE, "replay writes --samples or --json, not both");
     }
     replay.ctl = (access(replay.path, R_OK) != 0) ? self : NULL;
     code = recording_open(&replay.recording, replay.ctl, replay.path);
@@ -284,6 +330,9 @@ int verb_replay(ctl_t *self, int count, char **words) {
     }
     if (code != CTL_OK) {
         return code;
+    }
+    if (replay.samples) {
+        begin_samples(&replay);
     }
     if (replay.events.file != NULL) {
         replay_exactly(&replay);

@@ -52,6 +52,7 @@ int verb_bringup(ctl_t *self, int count, char **words);
 int verb_top(ctl_t *self, int count, char **words);
 int verb_web(ctl_t *self, int count, char **words);
 int verb_fleet(ctl_t *self, int count, char **words);
+int verb_export(ctl_t *self, int count, char **words);
 int verb_help(ctl_t *self, int count, char **words);
 
 /// Prints "iwheelctl: ..." on stderr and returns `code`.

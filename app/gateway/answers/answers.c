@@ -195,6 +195,9 @@ void iwn_target_other(iwn_server_t *server, iwn_client_t *client) {
     case IWN_CMD_RECORDING:
         gw_recordings_ask(self, client);
         break;
+    case IWN_CMD_RECORD:
+        gw_recordings_record(self, client);
+        break;
     default: // A client that may drive must not change a file that an administrator writes.
         (void)IWN_REFUSE(&server->refusal, IWN_DENIED,
                          "this gateway's configuration is a file: change it, check it with "

@@ -139,4 +139,7 @@ bool gw_grant_is_same_key(const char a[IWN_LEASE_KEY_MAX + 1U], const char b[IWN
 /// Executes `recordings` or `recording`: refuses it, or leaves the reply to gw_recordings_take.
 void gw_recordings_ask(gw_answers_t *self, iwn_client_t *client);
 
+/// Executes `record`: begins or ends the recording on request. The reply does not wait for the disk.
+void gw_recordings_record(gw_answers_t *self, iwn_client_t *client);
+
 #endif

@@ -34,6 +34,20 @@ void gw_recordings_ask(gw_answers_t *self, iwn_client_t *client) {
     }
 }
 
+void gw_recordings_record(gw_answers_t *self, iwn_client_t *client) {
+    const iwn_request_t *request = &self->server.request;
+    char who[GW_CLIENT_TEXT_SIZE];
+    gw_answers_describe(self, client->id, who);
+    const char *why = gw_record_request(self->box, request->on, who, self->server.now_us);
+    if (why != NULL) {
+        refuse(self, client, &request->id, IWN_DENIED, why);
+        return;
+    }
+    iwn_out_t json = iwn_server_begin_reply(&self->server, &request->id);
+    gw_record_write_request(self->box, &json);
+    iwn_server_send_reply(&self->server, client, &json);
+}
+
 /// Marks the question of a client as answered. A client that has ended is served again, because its slot was retained
 /// only for this.
 static void settle(sock_client_t *connection) {
@@ -56,6 +70,11 @@ static void pass_on(gw_answers_t *self, const gw_box_answer_t *answer) {
     }
     iwn_out_t json = iwn_server_begin_reply(&self->server, &served->read_id);
     iwn_out_span(&json, iwn_span(NULL), (iwn_span_t){answer->text, answer->length});
+    if (answer->list) {
+        iwn_out_open(&json, "on_request", '{');
+        gw_record_write_request(self->box, &json);
+        iwn_out_close(&json, '}');
+    }
     iwn_server_send_reply(&self->server, &served->client, &json);
 }
 

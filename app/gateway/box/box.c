@@ -11,6 +11,7 @@
 #include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include <sys/mman.h>
 
 /// The loop has precedence over the writer.
@@ -46,7 +47,7 @@ int gw_box_open(gw_box_t *self, const gw_box_config_t *config) {
 }
 
 void gw_box_close(gw_box_t *self) {
-    const gw_box_order_t bye = {.last = true};
+    const gw_box_order_t bye = {.kind = GW_BOX_LAST};
     (void)gw_child_say(&self->writer, &bye, sizeof bye);
     gw_child_close(&self->writer);
     gw_child_close(&self->reader);
@@ -65,6 +66,22 @@ static gw_child_news_t not_understood(gw_child_t *child) {
     return GW_CHILD_ENDED;
 }
 
+/// A result of an earlier request changes nothing.
+static void take_request(gw_box_request_t *self, const gw_box_result_t *result) {
+    const char *slash = strrchr(result->path, '/');
+    if (result->number != self->number) {
+        return;
+    }
+    self->ended = result->ended;
+    self->error = result->error;
+    if (result->ended != GW_BOX_RUNS) {
+        self->on = false;
+    }
+    if (slash != NULL) {
+        (void)snprintf(self->name, sizeof self->name, "%.*s", (int)strcspn(slash + 1, "."), slash + 1);
+    }
+}
+
 gw_child_news_t gw_box_take(gw_box_t *self) {
     gw_box_result_t result;
     size_t length;
@@ -73,10 +90,19 @@ gw_child_news_t gw_box_take(gw_box_t *self) {
         return not_understood(&self->writer);
     }
     if (news == GW_CHILD_SAID) {
+        self->news = result.kind;
+    }
+    if (news == GW_CHILD_SAID && result.kind != GW_BOX_STOP) {
+        take_request(&self->request, &result);
+    } else if (news == GW_CHILD_SAID) {
         self->last = result;
         if (result.number != 0U) {
             self->stop = result;
         }
+    } else if (news == GW_CHILD_ENDED && self->request.on) {
+        self->request.on = false;
+        self->request.ended = GW_BOX_BY_FAULT;
+        self->request.error = ESRCH;
     }
     return news;
 }
@@ -142,6 +168,64 @@ void gw_record_rolling(gw_box_t *box, sock_log_t *log, const iw_snapshot_t *seen
     }
 }
 
+static const char *const ends[GW_BOX_ENDS] = {
+    [GW_BOX_BY_REQUEST] = "request", [GW_BOX_BY_TIME] = "time", [GW_BOX_BY_SIZE] = "size", [GW_BOX_BY_FAULT] = "fault"};
+
+static bool order_request(gw_box_t *box, const gw_box_order_t *order) {
+    return (order->kind == GW_BOX_BEGIN) ? gw_box_write(box, order) : gw_child_say(&box->writer, order, sizeof *order);
+}
+
+const char *gw_record_request(gw_box_t *box, bool on, const char *who, iw_time_us_t now_us) {
+    gw_box_request_t *request = &box->request;
+    if (box->config.blackbox_s == 0U) {
+        return "nothing is recorded: [record] blackbox_s is 0; set it, then restart the gateway";
+    }
+    if (on == request->on) {
+        return NULL;
+    }
+    if (on && request->number != 0U && now_us - request->begun_us < GW_RECORD_AGAIN_US) {
+        return "the last recording on request began less than 2 s ago; wait, then send this request again";
+    }
+    gw_box_order_t order = {.kind = on ? GW_BOX_BEGIN : GW_BOX_END,
+                            .cause = GW_BOX_REQUESTED,
+                            .from = "listening",
+                            .mark = blackbox_ring_written(box->ring)};
+    order.note.stop.number = request->number + (on ? 1U : 0U);
+    order.note.stop.at_us = now_us;
+    order.note.wall_us = iwl_clock_wall_us();
+    order.wall_minus_us = order.note.wall_us - (int64_t)now_us;
+    (void)snprintf(order.note.sentence, sizeof order.note.sentence, "recorded on request of %s; it is no stop", who);
+    if (!order_request(box, &order)) {
+        return "the process that writes recordings is gone or too far behind; send this request again after 10 s";
+    }
+    if (on) {
+        *request = (gw_box_request_t){.number = order.note.stop.number, .begun_us = now_us};
+    }
+    request->on = on;
+    return NULL;
+}
+
+void gw_record_write_request(const gw_box_t *box, iwn_out_t *json) {
+    const gw_box_request_t *request = &box->request;
+    iwn_out_bool(json, "on", request->on);
+    iwn_out_text(json, "name", (request->name[0] != '\0') ? request->name : NULL);
+    iwn_out_text(json, "ended", ends[request->ended]);
+    iwn_out_text(json, "fault", (request->ended == GW_BOX_BY_FAULT) ? sock_folder_fault(request->error) : NULL);
+    iwn_out_int(json, "most_ms", (int64_t)(GW_BOX_REQUEST_US / IW_US_PER_MS));
+    iwn_out_int(json, "most_bytes", (int64_t)GW_BOX_REQUEST_BYTES);
+}
+
+static void report_request(const gw_box_request_t *request, sock_log_t *log) {
+    if (request->ended == GW_BOX_BY_FAULT) {
+        sock_log(log, SOCK_LOG_WARNING, "the recording on request has ended: %s; %s", sock_folder_fault(request->error),
+                 sock_folder_fix(request->error));
+    } else if (request->ended == GW_BOX_RUNS) {
+        sock_log(log, SOCK_LOG_INFO, "recording on request to %s", request->name);
+    } else {
+        sock_log(log, SOCK_LOG_INFO, "the recording on request %s has ended: %s", request->name, ends[request->ended]);
+    }
+}
+
 static void report_result(const gw_box_t *box, sock_log_t *log) {
     const gw_box_result_t *result = &box->last;
     const char *directory = box->config.directory;
@@ -166,7 +250,11 @@ static void report_result(const gw_box_t *box, sock_log_t *log) {
 void gw_record_take(gw_box_t *box, sock_log_t *log) {
     switch (gw_box_take(box)) {
     case GW_CHILD_SAID:
-        report_result(box, log);
+        if (box->news == GW_BOX_STOP) {
+            report_result(box, log);
+        } else {
+            report_request(&box->request, log);
+        }
         break;
     case GW_CHILD_ENDED:
         sock_log(

@@ -21,13 +21,25 @@
 
 struct sock_log;
 
+/// The recording on request, as its last order and the writer's results describe it.
+typedef struct {
+    uint32_t number; ///< Number of the last request to begin; 0: there was none.
+    bool on;         ///< It is being written, or the writer has the order to begin it.
+    iw_time_us_t begun_us;
+    gw_box_end_t ended;          ///< Reason for its end; GW_BOX_RUNS if the writer has not reported it.
+    int error;                   ///< An errno or a reason of owners.h, with GW_BOX_BY_FAULT.
+    char name[GW_BOX_STEM_SIZE]; ///< Name of its files without ending; empty before they exist.
+} gw_box_request_t;
+
 typedef struct gw_box {
     blackbox_ring_t *ring;
     size_t ring_size;
     gw_box_config_t config;
     gw_child_t writer;
     gw_child_t reader;
-    gw_box_result_t last;   ///< Last result; number 0 if there is none, or it was not a stop.
+    gw_box_result_t last;     ///< Last result of a stop or of the directory; number 0: it was not a stop.
+    gw_box_order_kind_t news; ///< Kind of order to which the last received result belongs.
+    gw_box_request_t request;
     gw_box_result_t stop;   ///< Last result of a stop; number 0 if there is none.
     gw_box_answer_t answer; ///< Last answer.
 } gw_box_t;
@@ -60,6 +72,16 @@ void gw_record_stop(gw_box_t *box, struct sock_log *log, const iwn_stop_note_t *
 
 /// Orders a recording of rolling wheels: without a stop, with the cause `rolling`.
 void gw_record_rolling(gw_box_t *box, struct sock_log *log, const iw_snapshot_t *seen);
+
+/// Two recordings on request begin at least this time apart, so that no client fills the log or wears the disk.
+#define GW_RECORD_AGAIN_US 2000000U
+
+/// Begins or ends the recording on request. `who` describes the client. A request for the present state changes
+/// nothing. Returns NULL, or the reason why it cannot begin, with the fix.
+const char *gw_record_request(gw_box_t *box, bool on, const char *who, iw_time_us_t now_us);
+
+/// Writes the state of the recording on request into an open object.
+void gw_record_write_request(const gw_box_t *box, iwn_out_t *json);
 
 /// Receives results of the writer and logs them.
 void gw_record_take(gw_box_t *box, struct sock_log *log);

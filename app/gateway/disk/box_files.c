@@ -193,7 +193,8 @@ static void choose(survey_t *survey, int directory, const gw_box_limits_t *limit
     for (size_t i = 0; i < survey->recordings && (survey->left > limits->recordings || survey->bytes > limits->bytes);
          i++) {
         found_t *recording = &survey->file[i];
-        const bool stays = recording->removed || recording->number >= limits->below;
+        const bool stays =
+            recording->removed || recording->number >= limits->below || recording->number == limits->running;
         if (!stays && !(harmless_only && was_in_motion(directory, recording))) {
             recording->removed = true;
             survey->bytes -= recording->bytes;
@@ -232,13 +233,27 @@ void gw_box_files_rotate(int directory, const gw_box_limits_t *limits) {
     } while (thin_out(survey, directory, limits) > 0U && survey->partial);
 }
 
-bool gw_box_files_drop_oldest(int directory, uint32_t below, bool in_motion) {
+bool gw_box_files_drop_oldest(int directory, const gw_box_limits_t *limits) {
     survey_t *const survey = survey_directory(directory);
     if (survey->recordings == 0U) {
         return false;
     }
-    const gw_box_limits_t limits = {survey->recordings - 1U, UINT64_MAX, below, in_motion};
-    return thin_out(survey, directory, &limits) > 0U;
+    const gw_box_limits_t but_one = {survey->recordings - 1U, UINT64_MAX, limits->below, limits->in_motion,
+                                     limits->running};
+    return thin_out(survey, directory, &but_one) > 0U;
+}
+
+void gw_box_files_limit_requested(int directory, size_t most) {
+    survey_t *const survey = survey_directory(directory);
+    size_t left = most;
+    for (size_t i = survey->recordings; i > 0U; i--) { // The newest first.
+        found_t *recording = &survey->file[i - 1U];
+        if (strcmp(recording->cause, GW_BOX_REQUESTED) == 0) {
+            recording->removed = left == 0U;
+            left -= (left > 0U) ? 1U : 0U;
+        }
+    }
+    visit(directory, take_chosen, survey);
 }
 
 void gw_box_files_reserve(int directory, uint64_t bytes) {

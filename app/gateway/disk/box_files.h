@@ -10,11 +10,9 @@
 
 #include <stdio.h>
 
-/// Recordings in the directory are numbered, few, and have three files each. Only files with the writer's form of name
-/// are removed.
-#define GW_BOX_STEM_SIZE 64U
-#define GW_BOX_PREFIX    "stop-"
-#define GW_BOX_ENDINGS   3U
+/// Only files with the writer's form of name are removed.
+#define GW_BOX_PREFIX  "stop-"
+#define GW_BOX_ENDINGS 3U
 
 /// Endings of the files of frames, of other entries, and of the configuration.
 extern const char *const gw_box_endings[GW_BOX_ENDINGS];
@@ -43,14 +41,19 @@ typedef struct {
     uint64_t bytes;    ///< ... and of their total size.
     uint32_t below;    ///< Only recordings with lower numbers are removed.
     bool in_motion;    ///< Recordings of stops in motion may be removed too, when no other is left.
+    uint32_t running;  ///< The recording with this number is still being written, and is not removed; 0: none.
 } gw_box_limits_t;
 
 /// Removes recordings until the rest fits `limits`: first those of stops at standstill, then the others, the oldest of
 /// each kind first. The time grows linearly with the number of files.
 void gw_box_files_rotate(int directory, const gw_box_limits_t *limits);
 
-/// Removes one recording with a number below `below`, in the order above. Returns false if there is none.
-bool gw_box_files_drop_oldest(int directory, uint32_t below, bool in_motion);
+/// Removes one recording with a number below `limits->below`, in the order above. Returns false if there is none.
+/// The sizes in `limits` do not count.
+bool gw_box_files_drop_oldest(int directory, const gw_box_limits_t *limits);
+
+/// Removes the oldest recordings on request until `most` of them are left.
+void gw_box_files_limit_requested(int directory, size_t most);
 
 /// Allocates this many bytes in a file of the directory, unless the file exists. A file system without this function
 /// has no reserve.

@@ -261,6 +261,7 @@ static void answer_piece(int directory, const gw_box_question_t *question, gw_bo
 void gw_box_reader_answer(const char *path, const gw_box_question_t *question, gw_box_answer_t *out) {
     const int directory = sock_folder_open_own(path);
     out->client = question->client;
+    out->list = question->list;
     if (directory < 0) {
         refuse(out, IWN_DENIED, "the directory of the recordings cannot be read: %s; %s", sock_folder_fault(errno),
                sock_folder_fix(errno));

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "box_files.h"
-
-#include "candump.h"
+#include "box_writer.h"
 
 #include "iwheel_linux/clock.h"
 
@@ -16,6 +14,8 @@
 
 /// Interval of reading entries after the stop.
 #define FOLLOW_MS 50
+/// Interval of reading entries for the recording on request: a fraction of the time that the ring covers.
+#define REQUEST_MS 200
 /// Number of attempts if another process uses a number first.
 #define TRIES 8U
 /// A faster wheel was in motion: the default of rest_rpm.
@@ -24,64 +24,8 @@
 #define RESERVE_PER_ENTRY 48U
 #define RESERVE_MAX       ((uint64_t)4U * 1024U * 1024U)
 
-typedef struct {
-    int fd;
-    const blackbox_ring_t *ring;
-    const gw_box_config_t *config;
-    blackbox_entry_t *copy; ///< Buffer for all entries of the ring.
-    const gw_box_order_t *order;
-    const char *bus; ///< Name in the file of frames.
-    FILE *frames_file;
-    FILE *events_file;
-    uint64_t next; ///< Number of the next entry to write.
-    uint64_t frames;
-    int error;      ///< Errno of the first failed write of this attempt.
-    bool in_motion; ///< A wheel turned at the stop, or was commanded to.
-    gw_box_result_t result;
-    char line[GW_BOX_LINE_SIZE]; ///< Buffer of a line.
-} writer_t;
-
-/// Stores the errno of a failed call, because stdio stores only that there was one.
-static void keep_error(writer_t *self, bool failed) {
-    if (failed && self->error == 0) {
-        self->error = (errno != 0) ? errno : EIO;
-    }
-}
-
-/// Writes the contents of `line`.
-static void put_line(writer_t *self, FILE *file, size_t length) {
-    keep_error(self, fwrite(self->line, 1, length, file) != length);
-}
-
-static void write_entry(writer_t *self, const blackbox_entry_t *entry) {
-    if (entry->kind != (uint8_t)BLACKBOX_FRAME) {
-        put_line(self, self->events_file, gw_box_line_entry(entry, self->frames, self->line));
-        return;
-    }
-    iw_can_frame_t frame = {.id = entry->number, .dlc = entry->a, .kind = entry->b};
-    memcpy(frame.data, entry->as.data, sizeof frame.data);
-    const candump_t out = candump_from_core(&frame, (int64_t)entry->at_us + self->order->wall_minus_us, self->bus);
-    put_line(self, self->frames_file, candump_write(&out, self->line));
-    self->frames++;
-}
-
-/// Writes the entries up to number `to`, except those before `since_us`.
-static void write_entries(writer_t *self, uint64_t to, iw_time_us_t since_us) {
-    size_t count = 0;
-    const uint64_t first = blackbox_ring_copy(self->ring, self->next, to, self->copy, &count);
-    if (first > self->next && since_us == 0U) {
-        put_line(self, self->events_file, gw_box_line_lost(first - self->next, self->frames, self->line));
-    }
-    for (size_t i = 0; i < count; i++) {
-        if (self->copy[i].at_us >= since_us) {
-            write_entry(self, &self->copy[i]);
-        }
-    }
-    self->next = first + count;
-}
-
 /// Returns the time of the first entry of the recording.
-static iw_time_us_t begin_of(writer_t *self, iw_time_us_t since_us) {
+static iw_time_us_t begin_of(gw_writer_t *self, iw_time_us_t since_us) {
     size_t count = 0;
     (void)blackbox_ring_copy(self->ring, 0, self->order->mark, self->copy, &count);
     for (size_t i = 0; i < count; i++) {
@@ -93,83 +37,48 @@ static iw_time_us_t begin_of(writer_t *self, iw_time_us_t since_us) {
 }
 
 /// Returns true if the gateway has sent something, or has ended.
-static bool is_called(const writer_t *self, int timeout_ms) {
+static bool is_called(const gw_writer_t *self, int timeout_ms) {
     struct pollfd entry = {.fd = self->fd, .events = POLLIN};
     return poll(&entry, 1, timeout_ms) != 0;
 }
 
-static void flush(writer_t *self) {
-    keep_error(self, fflush(self->frames_file) != 0);
-    keep_error(self, fflush(self->events_file) != 0);
-}
-
 /// Writes the entries after the stop, until it is over or the next order waits.
-static void follow(writer_t *self) {
+static void follow(gw_writer_t *self) {
     const iw_time_us_t until_us = self->order->note.stop.at_us + GW_BOX_AFTER_US;
     while (iwl_clock_now_us() < until_us && !is_called(self, FOLLOW_MS)) {
-        write_entries(self, UINT64_MAX, 0);
-        flush(self);
+        gw_writer_entries(self, UINT64_MAX, 0);
+        gw_writer_flush(self);
+        gw_request_step(self->request);
     }
-    write_entries(self, UINT64_MAX, 0);
+    gw_writer_entries(self, UINT64_MAX, 0);
 }
 
-static void finish_file(writer_t *self, FILE *file) {
-    keep_error(self, fflush(file) != 0);
-    keep_error(self, fsync(fileno(file)) != 0);
-    keep_error(self, fclose(file) != 0);
-}
-
-static void write_config(writer_t *self, int directory, const char *stem) {
-    FILE *file = gw_box_files_create(directory, stem, ".conf");
-    keep_error(self, file == NULL);
-    if (file != NULL) {
-        keep_error(self, fputs(self->config->config, file) < 0);
-        finish_file(self, file);
-    }
-}
-
-static void fill_files(writer_t *self) {
+static void fill_files(gw_writer_t *self) {
     const iw_stop_t *stop = &self->order->note.stop;
     const iw_time_us_t length_us = (iw_time_us_t)self->config->blackbox_s * 1000000U;
     const iw_time_us_t since_us = (stop->at_us > length_us) ? stop->at_us - length_us : 1U;
     const iw_time_us_t begin_us = begin_of(self, since_us);
     const bool from_start = blackbox_ring_is_whole(self->ring) && begin_us <= self->copy[0].at_us;
-    self->next = 0;
-    self->frames = 0;
     self->result.ms = (uint32_t)((stop->at_us - begin_us) / IW_US_PER_MS);
-    put_line(self, self->events_file, gw_box_line_head(self->config, self->order, from_start, self->line));
-    put_line(self, self->events_file, gw_box_line_stop(self->order, self->in_motion, self->line));
-    write_entries(self, self->order->mark, since_us);
-    flush(self);
+    gw_writer_head(self, from_start);
+    gw_writer_entries(self, self->order->mark, since_us);
+    gw_writer_flush(self);
     if (self->error != 0) {
         return; // As early as possible, because the rest needs two seconds.
     }
     follow(self);
     self->result.frames = (uint32_t)self->frames;
-    flush(self); // The last line confirms the rest, so it is written after all of it.
-    put_line(self, self->events_file, gw_box_line_end(self->frames, self->line));
 }
 
 /// Makes one attempt to write all files of the recording. Returns 0 or the errno of the first failure; then there are
 /// none.
-static int write_files(writer_t *self, int directory, uint32_t number) {
-    char stem[GW_BOX_STEM_SIZE];
-    (void)snprintf(stem, sizeof stem, "stop-%06u-%s", (unsigned)number, self->order->cause);
-    (void)snprintf(self->result.path, sizeof self->result.path, "%s/%s.log", self->config->directory, stem);
-    self->error = 0;
-    write_config(self, directory, stem);
+static int write_files(gw_writer_t *self, int directory, uint32_t number) {
+    if (gw_writer_open(self, directory, number) == 0) {
+        fill_files(self);
+        gw_writer_close(self);
+    }
     if (self->error == EEXIST) {
         return EEXIST; // Another process has it: the previous gateway may still write its last recording.
-    }
-    self->frames_file = (self->error == 0) ? gw_box_files_create(directory, stem, ".log") : NULL;
-    self->events_file = (self->frames_file != NULL) ? gw_box_files_create(directory, stem, ".jsonl") : NULL;
-    keep_error(self, self->events_file == NULL);
-    if (self->events_file != NULL) {
-        fill_files(self);
-        finish_file(self, self->events_file);
-    }
-    if (self->frames_file != NULL) {
-        finish_file(self, self->frames_file);
     }
     if (self->error != 0) {
         gw_box_files_remove(directory, number);
@@ -177,21 +86,26 @@ static int write_files(writer_t *self, int directory, uint32_t number) {
     return self->error;
 }
 
+/// Returns the number of the recording on request; 0 if none is being written.
+static uint32_t running(const gw_writer_t *self) {
+    return gw_request_runs(self->request) ? self->request->number : 0U;
+}
+
 /// Frees space on a full disk for recording `number`. For a stop at standstill it removes neither the reserve nor the
 /// recording of a stop in motion.
-static bool make_room(const writer_t *self, int directory, uint32_t number) {
-    return (self->in_motion && gw_box_files_release(directory)) ||
-           gw_box_files_drop_oldest(directory, number, self->in_motion);
+static bool make_room(const gw_writer_t *self, int directory, uint32_t number) {
+    const gw_box_limits_t limits = {.below = number, .in_motion = self->in_motion, .running = running(self)};
+    return (self->in_motion && gw_box_files_release(directory)) || gw_box_files_drop_oldest(directory, &limits);
 }
 
 /// Reserves the size of a recording of a full ring, within limits.
-static void reserve(const writer_t *self, int directory) {
+static void reserve(const gw_writer_t *self, int directory) {
     const uint64_t bytes = (uint64_t)blackbox_ring_most(self->ring) * RESERVE_PER_ENTRY;
     gw_box_files_reserve(directory, (bytes < RESERVE_MAX) ? bytes : RESERVE_MAX);
 }
 
 /// Writes a recording. On a full disk it removes older recordings.
-static int write_recording(writer_t *self) {
+static int write_recording(gw_writer_t *self) {
     const int directory = gw_box_files_open(self->config->directory);
     if (directory < 0) {
         return errno;
@@ -205,8 +119,8 @@ static int write_recording(writer_t *self) {
     while ((error == ENOSPC || error == EDQUOT) && make_room(self, directory, number)) {
         error = write_files(self, directory, number);
     }
-    gw_box_files_rotate(directory,
-                        &(gw_box_limits_t){self->config->keep_stops, GW_BOX_BYTES_MAX, number, self->in_motion});
+    gw_box_files_rotate(directory, &(gw_box_limits_t){self->config->keep_stops, GW_BOX_BYTES_MAX, number,
+                                                      self->in_motion, running(self)});
     reserve(self, directory);
     (void)fsync(directory);
     (void)close(directory);
@@ -219,7 +133,7 @@ typedef struct {
     int16_t rpm[IW_SIDES]; ///< Measured speed; 0 without telemetry.
 } last_seen_t;
 
-static last_seen_t find_last(writer_t *self, uint64_t written) {
+static last_seen_t find_last(gw_writer_t *self, uint64_t written) {
     last_seen_t last = {.rpm = {0, 0}};
     size_t count = 0;
     (void)blackbox_ring_copy(self->ring, 0, written, self->copy, &count);
@@ -241,7 +155,7 @@ static last_seen_t find_last(writer_t *self, uint64_t written) {
     return last;
 }
 
-static bool is_in_motion(writer_t *self, const gw_box_order_t *order) {
+static bool is_in_motion(gw_writer_t *self, const gw_box_order_t *order) {
     const last_seen_t last = find_last(self, order->mark);
     for (unsigned side = 0; side < IW_SIDES; side++) {
         if (order->note.stop.applied.wheel[side].speed_mm_s != 0 || abs(last.rpm[side]) > REST_RPM) {
@@ -251,7 +165,7 @@ static bool is_in_motion(writer_t *self, const gw_box_order_t *order) {
     return false;
 }
 
-static void carry_out(writer_t *self, const gw_box_order_t *order) {
+static void carry_out(gw_writer_t *self, const gw_box_order_t *order) {
     self->order = order;
     self->in_motion = is_in_motion(self, order);
     self->result = (gw_box_result_t){.number = order->note.stop.number};
@@ -261,7 +175,7 @@ static void carry_out(writer_t *self, const gw_box_order_t *order) {
 }
 
 /// Reports an unusable directory immediately, not when the first stop is lost.
-static void try_directory(writer_t *self) {
+static void try_directory(gw_writer_t *self) {
     const int directory = gw_box_files_open(self->config->directory);
     self->result = (gw_box_result_t){.error = (directory < 0) ? errno : 0};
     if (directory >= 0 && faccessat(directory, ".", W_OK, AT_EACCESS) != 0) {
@@ -277,7 +191,7 @@ static void try_directory(writer_t *self) {
 }
 
 /// Handles a gateway that has ended without a message: writes a recording if it commanded the wheels.
-static void note_death(writer_t *self) {
+static void note_death(gw_writer_t *self) {
     gw_box_order_t order = {.cause = "gateway_died", .from = "armed", .mark = blackbox_ring_written(self->ring)};
     if (!atomic_load(&self->ring->sending)) {
         return;
@@ -301,29 +215,54 @@ static void note_death(writer_t *self) {
     carry_out(self, &order);
 }
 
-void gw_box_writer_run(int fd, const blackbox_ring_t *ring, const gw_box_config_t *config) {
+/// Writes the recording on request until a message waits, or the gateway has ended.
+static void wait_for_order(gw_writer_t *self) {
+    do {
+        gw_request_step(self->request);
+    } while (gw_request_runs(self->request) && !is_called(self, REQUEST_MS));
+}
+
+static void follow_orders(gw_writer_t *self) {
     gw_box_order_t order;
-    static writer_t self; // Too large for a stack.
-    self = (writer_t){.fd = fd, .ring = ring, .config = config};
+    for (;;) {
+        wait_for_order(self);
+        const ssize_t got = recv(self->fd, &order, sizeof order, 0);
+        if (got < 0 && errno == EINTR) {
+            continue;
+        }
+        if (got != (ssize_t)sizeof order) {
+            note_death(self);
+            return;
+        }
+        switch (order.kind) {
+        case GW_BOX_STOP:
+            carry_out(self, &order);
+            break;
+        case GW_BOX_BEGIN:
+            gw_request_begin(self->request, &order);
+            break;
+        case GW_BOX_END:
+            gw_request_end(self->request, GW_BOX_BY_REQUEST);
+            break;
+        default:
+            return;
+        }
+    }
+}
+
+void gw_box_writer_run(int fd, const blackbox_ring_t *ring, const gw_box_config_t *config) {
+    static gw_writer_t self; // Too large for a stack.
+    static gw_writer_t request;
+    self = (gw_writer_t){.fd = fd, .ring = ring, .config = config, .most_bytes = UINT64_MAX};
     self.bus = (strncmp(config->bus, "unix:", 5) == 0) ? "local" : config->bus;
     self.copy = (blackbox_entry_t *)calloc(blackbox_ring_most(ring), sizeof *self.copy);
     if (self.copy == NULL) {
         return;
     }
+    request = self;
+    self.request = &request;
     try_directory(&self);
-    for (;;) {
-        const ssize_t got = recv(fd, &order, sizeof order, 0);
-        if (got < 0 && errno == EINTR) {
-            continue;
-        }
-        if (got != (ssize_t)sizeof order) {
-            note_death(&self);
-            break;
-        }
-        if (order.last) {
-            break;
-        }
-        carry_out(&self, &order);
-    }
+    follow_orders(&self);
+    gw_request_end(&request, GW_BOX_BY_REQUEST);
     free(self.copy);
 }

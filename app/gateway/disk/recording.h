@@ -15,6 +15,14 @@
 /// A recording continues for this time after the stop.
 #define GW_BOX_AFTER_US   2000000U
 #define GW_BOX_CAUSE_SIZE 32U
+/// Recordings are numbered, few, and have three files each. Size of such a name without its ending.
+#define GW_BOX_STEM_SIZE 64U
+/// Cause of a recording on request, in its name. It ends after this time, or at this size of its files.
+#define GW_BOX_REQUESTED     "requested"
+#define GW_BOX_REQUEST_US    ((iw_time_us_t)600000000U)
+#define GW_BOX_REQUEST_BYTES ((uint64_t)16U * 1024U * 1024U)
+/// Number of finished recordings on request that stay when another one begins.
+#define GW_BOX_REQUESTS_KEPT 2U
 /// Size of an answer of the reading process: a piece in base64, or the list.
 #define GW_BOX_ANSWER_SIZE 52000U
 /// Directory, '/', "stop-000001-", cause, ".jsonl".
@@ -30,10 +38,27 @@ typedef struct {
     const char *config; ///< Whole configuration, as in a file.
 } gw_box_config_t;
 
+typedef enum {
+    GW_BOX_STOP = 0, ///< Record a stop.
+    GW_BOX_BEGIN,    ///< Begin the recording on request ...
+    GW_BOX_END,      ///< ... and end it.
+    GW_BOX_LAST,     ///< Nothing to write: the gateway ends regularly.
+} gw_box_order_kind_t;
+
+/// Reason for the end of the recording on request.
+typedef enum {
+    GW_BOX_RUNS = 0,
+    GW_BOX_BY_REQUEST, ///< A client requested it, or the gateway has ended.
+    GW_BOX_BY_TIME,    ///< GW_BOX_REQUEST_US
+    GW_BOX_BY_SIZE,    ///< GW_BOX_REQUEST_BYTES
+    GW_BOX_BY_FAULT,   ///< The disk failed or is full, or the writer has ended.
+    GW_BOX_ENDS,
+} gw_box_end_t;
+
 /// Message of the gateway to the writer.
 typedef struct {
-    bool last; ///< Nothing to write: the gateway ends regularly.
-    iwn_stop_note_t note;
+    gw_box_order_kind_t kind;
+    iwn_stop_note_t note; ///< GW_BOX_BEGIN, GW_BOX_END: the number is that of the request.
     char cause[GW_BOX_CAUSE_SIZE];
     char side[8];          ///< "left", "right", "both", or empty.
     char from[16];         ///< Name of the state.
@@ -43,8 +68,10 @@ typedef struct {
 
 /// Message of the writer to the gateway. Without a stop (number 0): the directory cannot be used.
 typedef struct {
-    uint32_t number; ///< Number of the stop.
-    int error;       ///< An errno or a reason of owners.h; 0 if it is written.
+    gw_box_order_kind_t kind; ///< GW_BOX_STOP, or that of the order about the recording on request.
+    gw_box_end_t ended;       ///< GW_BOX_END: the reason.
+    uint32_t number;          ///< Number of the stop, or of the request.
+    int error;                ///< An errno or a reason of owners.h; 0 if it is written.
     uint32_t frames;
     uint32_t ms; ///< Time from the first entry to the stop.
     char path[GW_BOX_PATH_SIZE];
@@ -61,6 +88,7 @@ typedef struct {
 /// Answer to a question.
 typedef struct {
     iw_client_t client;
+    bool list;         ///< The question was for the list.
     iwn_error_t error; ///< IWN_OK: `text` has the fields of the reply as JSON; otherwise the reason.
     uint32_t length;   ///< Length of the text.
     char text[GW_BOX_ANSWER_SIZE];

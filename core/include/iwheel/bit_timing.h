@@ -10,6 +10,10 @@
 
 #include "iwheel/types.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /// The iWheel's bus, from its document: 1 Mbit/s, sampled at 62.5 % of the bit.
 #define IW_BUS_BITRATE_HZ            1000000U
 #define IW_BUS_SAMPLE_POINT_PERMILLE 625U ///< Sample point in permille of the bit.
@@ -49,4 +53,7 @@ iw_status_t iw_bit_timing_solve(const iw_bit_timing_limits_t *limits, uint32_t c
 /// more than UINT32_MAX clock periods.
 iw_bit_timing_achieved_t iw_bit_timing_achieved(uint32_t clock_hz, const iw_bit_timing_t *timing);
 
+#ifdef __cplusplus
+}
+#endif
 #endif

@@ -9,6 +9,10 @@
 
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define IW_CAN_EXTENDED 0x80000000U ///< 29-bit id.
 #define IW_CAN_REMOTE   0x40000000U ///< Remote transmission request: carries no data.
 #define IW_CAN_ERROR    0x20000000U ///< Not a frame of the bus but the controller's report of an error.
@@ -30,4 +34,7 @@ typedef struct {
     uint8_t kind;                  ///< An iw_can_kind_t. Ignored when sending.
 } iw_can_frame_t;
 
+#ifdef __cplusplus
+}
+#endif
 #endif

@@ -28,6 +28,10 @@
 #include "iwheel/can_frame.h"
 #include "iwheel/types.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define IW_ID_LEFT_SETPOINT  266U ///< 0x10A
 #define IW_ID_RIGHT_SETPOINT 298U ///< 0x12A
 #define IW_ID_LEFT_SPEED     256U ///< 0x100
@@ -166,4 +170,7 @@ iw_status_t iw_codec_encode(iw_codec_kind_t kind, iw_side_t side, const iw_codec
 bool iw_codec_encode_setpoint(iw_side_t side, const iw_codec_setpoint_t *setpoint, uint8_t dlc,
                               iw_can_frame_t *out_frame);
 
+#ifdef __cplusplus
+}
+#endif
 #endif

@@ -9,6 +9,10 @@
 
 #include "iwheel/types.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /// Radius that the wheel's firmware assumes: a setpoint of 1 mm/s is 1 mm/s at this radius. The core compares measured
 /// speeds with setpoints at this radius, whatever `radius_mm` is.
 #define IW_SETPOINT_RADIUS_MM 192
@@ -132,4 +136,7 @@ typedef struct {
 /// Returns the stop budget of a checked configuration.
 iw_stop_budget_t iw_config_stop_budget(const iw_config_t *config);
 
+#ifdef __cplusplus
+}
+#endif
 #endif

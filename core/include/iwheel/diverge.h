@@ -19,6 +19,10 @@
 
 #include "iwheel/config.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /// A difference from the expected speed of up to this share does not count. Chosen by us.
 #define IW_DIVERGE_DROOP_PERCENT 4
 /// A wheel below this share of its expected speed is slow: zero immediately. Chosen by us: docs/user/pair.md has the
@@ -69,4 +73,7 @@ void iw_diverge_receive(iw_diverge_t *self, size_t side, int32_t measured_mm_s);
 /// Compares the applied and measured speeds since the last step, and returns the result.
 iw_diverge_verdict_t iw_diverge_step(iw_diverge_t *self, iw_time_us_t now_us);
 
+#ifdef __cplusplus
+}
+#endif
 #endif

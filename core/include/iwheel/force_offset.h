@@ -34,6 +34,10 @@
 
 #include "iwheel/types.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /// Two seconds of force frames at their documented period of 50 ms.
 #define IW_FORCE_WINDOW_SAMPLES 40U
 /// A quiet sensor has a standard deviation below this in the window ...
@@ -173,4 +177,7 @@ int32_t iw_force_raw_mN(const iw_force_t *self);
 /// Returns raw force minus offset in mN. It is meaningful only with IW_FORCE_VALID.
 int32_t iw_force_net_mN(const iw_force_t *self);
 
+#ifdef __cplusplus
+}
+#endif
 #endif

@@ -31,6 +31,10 @@
 #include "iwheel/private/wheel.h"
 #include "iwheel/snapshot.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /// In a step that is later than this, reception times are unknown: its frames neither refresh a wheel nor time it out.
 #define IW_GATEWAY_LATE_US 20000U
 /// A step that is later than this, or a run of late steps of this length, causes STOPPING without a ramp.
@@ -150,4 +154,7 @@ void iw_gateway_restore_offset(iw_gateway_t *self, iw_side_t side, iw_offset_pro
 /// its own those that the bus shows directly. An entry with IW_ASSUMED changes nothing.
 void iw_gateway_set_assumption(iw_gateway_t *self, iw_assumption_item_t item, const iw_assumption_entry_t *entry);
 
+#ifdef __cplusplus
+}
+#endif
 #endif

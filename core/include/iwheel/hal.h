@@ -11,6 +11,10 @@
 #include "iwheel/can_frame.h"
 #include "iwheel/types.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /// State of the bus as the controller reports it.
 typedef enum {
     IW_BUS_DOWN = 0, ///< The interface is absent, down, or not open.
@@ -95,4 +99,7 @@ int iw_estop_pair_see(iw_estop_pair_t *self, iw_time_us_t now_us, int first, int
 /// Returns the time at which the result changes without a new reading, or IW_NEVER.
 iw_time_us_t iw_estop_pair_next_us(const iw_estop_pair_t *self);
 
+#ifdef __cplusplus
+}
+#endif
 #endif

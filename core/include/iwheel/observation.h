@@ -16,6 +16,10 @@
 
 #include "iwheel/snapshot.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /// The gear ratio is judged only above this speed (geometric mean of two frames): the resolution of 1 rpm is 10 % of
 /// it.
 #define IW_OBSERVATION_RPM 10
@@ -70,4 +74,7 @@ void iw_observation_init(iw_observation_t *self);
 /// step.
 void iw_observation_step(iw_observation_t *self, struct iw_gateway *gateway, const iw_snapshot_t *seen);
 
+#ifdef __cplusplus
+}
+#endif
 #endif

@@ -19,6 +19,10 @@
 #include "iwheel/hal.h"
 #include "iwheel/types.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 struct iw_gateway;
 
 /// Counters of received frames and requests. They wrap at 32 bits.
@@ -114,4 +118,7 @@ iw_refusal_t iw_gateway_arm_refusal(const struct iw_gateway *self);
 /// Returns true while the core sends setpoints, or is about to send one.
 bool iw_gateway_is_sending(const struct iw_gateway *self);
 
+#ifdef __cplusplus
+}
+#endif
 #endif

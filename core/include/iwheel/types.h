@@ -13,6 +13,10 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /// Stops the compilation if `condition` (a constant expression) is false. `name` must be unique in its file.
 #define IW_STATIC_ASSERT(condition, name) typedef char iw_static_assert_##name[(condition) ? 1 : -1]
 
@@ -141,6 +145,39 @@ typedef enum {
     IW_REFUSALS,
 } iw_refusal_t;
 
+/// Returns cause and fix of a refusal in one line of English, for a program without the northbound protocol. Never
+/// empty; the text is static. Inline, so that an image contains the texts only if it calls this function.
+static inline const char *iw_refusal_text(iw_refusal_t refusal) {
+    static const char *const texts[] = {
+        // In the order of iw_refusal_t, because C++ has no designators for arrays.
+        "not refused",
+        "a speed, yaw rate or current is outside its range; nothing was applied",
+        "the request has no currents, and current_role is setpoint; add the currents of both wheels",
+        "another client holds the lease; stop it first",
+        "another client holds the lease; stop it first, or request a takeover with both wheels at standstill",
+        "not armed; arm first",
+        "latched after a stop; remove its cause, then reset",
+        "the e-stop is pressed or unreadable; release the button, then reset",
+        "the bus is down; check cable, termination and bit rate",
+        "bit rate or sample point of the bus differ from the configuration; set both",
+        "a wheel sends no telemetry; check its power, cable and termination",
+        "a wheel did not follow its command; free it, and wait until the hold of zeros ends",
+        "the pair left its path; check the slower wheel, and wait until the hold of zeros ends",
+        "the wheels are not at standstill; wait until both are",
+        "a setpoint was not acknowledged on the bus; check that the wheels have power and the bus is terminated",
+        "another device sends setpoints; switch it off, and wait a second",
+        "a cause of a stop is present; remove it, and wait a second",
+        "setpoint_type or current_role is not configured; ask the vendor of the wheels for both",
+        "track_mm is not configured, and every limit of turning depends on it; measure and set it",
+        "a nonzero drive command came too recently or from before arming; release the stick, wait, then arm again",
+        "the gateway is configured to listen only; it never sends",
+        "a measurement contradicts an assumption that motion depends on; check the configuration of the wheels",
+    };
+    const unsigned index = (unsigned)refusal;
+    return (index < sizeof texts / sizeof texts[0]) ? texts[index]
+                                                    : "refused for a reason that has no text; report this";
+}
+
 /// The last stop, for `why`.
 typedef struct {
     iw_time_us_t at_us; ///< Time of the stop.
@@ -195,4 +232,7 @@ typedef struct {
         ///< Gear ratio: 1000 x ticks moved / expected. Pose: 1000 x distance read byte-swapped / read in order.
 } iw_assumption_entry_t;
 
+#ifdef __cplusplus
+}
+#endif
 #endif

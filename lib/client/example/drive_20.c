@@ -20,7 +20,7 @@ int main(int count, char **words) {
         (void)usleep((useconds_t)terms.lease_ms * 1000U / 3U);
     }
     if (result != IWC_OK) {
-        (void)fprintf(stderr, "drive_20: %s\n", (result == IWC_REFUSED) ? iwc_reason(gateway) : iwc_words(result));
+        (void)fprintf(stderr, "drive_20: %s\n", iwc_reason(gateway));
     }
     const iwc_result_t stopped = (terms.lease_ms > 0) ? iwc_stop(gateway, 1000) : result;
     iwc_free(gateway);

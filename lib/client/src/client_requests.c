@@ -89,7 +89,7 @@ iwc_result_t iwc_send(iwc_t *self, const char *request, int timeout_ms, int64_t 
     if (out_id != NULL) {
         *out_id = id;
     }
-    return send_as(self, request, id, iwc_deadline_us(timeout_ms));
+    return iwc_note(self, send_as(self, request, id, iwc_deadline_us(timeout_ms)));
 }
 
 static iwc_result_t await_answer(iwc_t *self, int64_t deadline_us) {
@@ -121,7 +121,7 @@ iwc_result_t iwc_ask(iwc_t *self, const char *request, int timeout_ms, iwc_messa
     self->awaited = 0;
     iwc_message_t reply;
     if (result != IWC_OK || !iwc_reply(self, &reply)) {
-        return result;
+        return iwc_note(self, result);
     }
     if (out_reply != NULL) {
         *out_reply = reply;
@@ -129,8 +129,8 @@ iwc_result_t iwc_ask(iwc_t *self, const char *request, int timeout_ms, iwc_messa
     if (iwc_truth(&reply, "ok").value == 1) {
         return IWC_OK;
     }
-    iwc_keep_refusal(self, &reply);
-    return IWC_REFUSED;
+    iwc_store_refusal(self, &reply);
+    return iwc_note(self, IWC_REFUSED);
 }
 
 bool iwc_reply(const iwc_t *self, iwc_message_t *out_reply) {
@@ -212,7 +212,7 @@ iwc_result_t iwc_status(iwc_t *self, int timeout_ms, iwc_state_t *out_state) {
     iwc_message_t reply;
     const iwc_result_t result = iwc_ask(self, "{\"cmd\":\"status\"}", timeout_ms, &reply);
     if (result == IWC_OK && !iwc_state(self, &reply, out_state)) {
-        return IWC_GARBLED;
+        return iwc_note(self, IWC_GARBLED);
     }
     return result;
 }
@@ -222,7 +222,7 @@ iwc_result_t iwc_watch(iwc_t *self, unsigned topics, int rate_hz, int timeout_ms
     const size_t count = sizeof names / sizeof names[0];
     request_t request = begin_request("watch");
     if (topics >= 1U << count || rate_hz < 1 || rate_hz > 100) {
-        return IWC_INVALID;
+        return iwc_note(self, IWC_INVALID);
     }
     add_integer(&request, "rate_hz", rate_hz);
     add(&request, ",\"topics\":[");
@@ -252,7 +252,7 @@ iwc_result_t iwc_arm_as(iwc_t *self, const iwc_arm_t *arm, int timeout_ms, iwc_t
     iwc_message_t reply;
     request_t request = begin_request("arm");
     if (!add_text(&request, "name", arm->name, NAME_MAX_BYTES)) {
-        return IWC_INVALID;
+        return iwc_note(self, IWC_INVALID);
     }
     add_known(&request, "t_us", arm->t_us);
     add(&request, arm->takeover ? ",\"takeover\":true}" : "}");
@@ -290,7 +290,7 @@ iwc_result_t iwc_drive_as(iwc_t *self, const iwc_drive_t *drive, const char *key
                           iwc_applied_t *out_applied) {
     request_t request = begin_request("drive");
     if (!add_text(&request, "key", key, IWC_KEY_SIZE - 1U)) {
-        return IWC_INVALID;
+        return iwc_note(self, IWC_INVALID);
     }
     add_integer(&request, "left_mm_s", drive->left_mm_s);
     add_integer(&request, "right_mm_s", drive->right_mm_s);
@@ -311,7 +311,7 @@ iwc_result_t iwc_twist_as(iwc_t *self, const iwc_twist_t *twist, const char *key
                           iwc_applied_t *out_applied) {
     request_t request = begin_request("twist");
     if (!add_text(&request, "key", key, IWC_KEY_SIZE - 1U)) {
-        return IWC_INVALID;
+        return iwc_note(self, IWC_INVALID);
     }
     add_integer(&request, "v_mm_s", twist->v_mm_s);
     add_integer(&request, "yaw_mrad_s", twist->yaw_mrad_s);
@@ -343,7 +343,8 @@ static bool begin_estop(request_t *out_request, const char *reason) {
 
 iwc_result_t iwc_estop(iwc_t *self, const char *reason, int timeout_ms) {
     request_t request;
-    return begin_estop(&request, reason) ? or_close(self, iwc_ask(self, request.text, timeout_ms, NULL)) : IWC_INVALID;
+    return begin_estop(&request, reason) ? or_close(self, iwc_ask(self, request.text, timeout_ms, NULL))
+                                         : iwc_note(self, IWC_INVALID);
 }
 
 iwc_result_t iwc_stop_at(iwc_t *self, const char *path, int timeout_ms) {
@@ -352,7 +353,8 @@ iwc_result_t iwc_stop_at(iwc_t *self, const char *path, int timeout_ms) {
 
 iwc_result_t iwc_estop_at(iwc_t *self, const char *path, const char *reason, int timeout_ms) {
     request_t request;
-    return begin_estop(&request, reason) ? iwc_stop_by(self, path, request.text, timeout_ms) : IWC_INVALID;
+    return begin_estop(&request, reason) ? iwc_stop_by(self, path, request.text, timeout_ms)
+                                         : iwc_note(self, IWC_INVALID);
 }
 
 iwc_result_t iwc_reset(iwc_t *self, int timeout_ms) {

@@ -99,12 +99,12 @@ iwc_result_t iwc_stop_by(iwc_t *self, const char *path, const char *request, int
         const iwc_result_t result = iwc_find(NULL, found, sizeof found);
         if (result != IWC_OK) {
             iwc_close(self);
-            return result;
+            return iwc_note(self, result);
         }
         path = found;
     }
     const char *const paths[2] = {path, find_other(path, other, sizeof other) ? other : NULL};
     const iwc_result_t result = stop_by_either(self, paths, request, deadline_us);
     iwc_close(self);
-    return result;
+    return iwc_note(self, result);
 }

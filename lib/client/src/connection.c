@@ -34,6 +34,7 @@ iwc_t *iwc_new(void) {
         self->line[0] = '\0';
         self->fd = -1;
         self->over = IWC_CLOSED;
+        self->failed = IWC_CLOSED;
     }
     return self;
 }
@@ -147,14 +148,25 @@ static void begin(iwc_t *self) {
     self->newer = false;
     self->error_number = 0;
     self->awaited = 0;
+    self->failed = IWC_OK;
     self->error[0] = '\0';
     self->reason[0] = '\0';
     self->path[0] = '\0';
 }
 
-void iwc_keep_refusal(iwc_t *self, const iwc_message_t *reply) {
+void iwc_store_refusal(iwc_t *self, const iwc_message_t *reply) {
     (void)iwc_text(reply, "error", self->error, sizeof self->error);
-    (void)iwc_text(reply, "message", self->reason, sizeof self->reason);
+    if (!iwc_text(reply, "message", self->reason, sizeof self->reason) || self->reason[0] == '\0') {
+        (void)snprintf(self->reason, sizeof self->reason, "the gateway refused without a message: %s; see its log",
+                       (self->error[0] != '\0') ? self->error : "no name of an error");
+    }
+}
+
+iwc_result_t iwc_note(iwc_t *self, iwc_result_t result) {
+    if (result != IWC_OK) {
+        self->failed = result;
+    }
+    return result;
 }
 
 /// Reads the first line: the event hello, or the refusal of one client too many.
@@ -171,7 +183,7 @@ static iwc_result_t greet(iwc_t *self, int64_t deadline_us) {
         }
     }
     if (result == IWC_OK && iwc_truth(&hello, "ok").known && iwc_truth(&hello, "ok").value == 0) {
-        iwc_keep_refusal(self, &hello);
+        iwc_store_refusal(self, &hello);
         result = IWC_REFUSED;
     } else if (result == IWC_OK && !iwc_is(&hello, "event", "hello")) {
         result = IWC_GARBLED;
@@ -196,10 +208,10 @@ iwc_result_t iwc_adopt(iwc_t *self, int fd, int timeout_ms) {
     begin(self);
     const int flags = fcntl(fd, F_GETFL);
     if (flags < 0 || fcntl(fd, F_SETFL, flags | O_NONBLOCK) != 0 || fcntl(fd, F_SETFD, FD_CLOEXEC) != 0) {
-        return IWC_INVALID;
+        return iwc_note(self, IWC_INVALID);
     }
     take_socket(self, fd);
-    return greet(self, iwc_deadline_us(timeout_ms));
+    return iwc_note(self, greet(self, iwc_deadline_us(timeout_ms)));
 }
 
 static iwc_result_t meaning_of(int error) {
@@ -267,7 +279,7 @@ iwc_result_t iwc_dial(iwc_t *self, const char *path, int64_t deadline_us) {
 iwc_result_t iwc_connect(iwc_t *self, const char *path, int timeout_ms) {
     const int64_t deadline_us = iwc_deadline_us(timeout_ms);
     const iwc_result_t result = iwc_dial(self, path, deadline_us);
-    return (result == IWC_OK) ? greet(self, deadline_us) : result;
+    return iwc_note(self, (result == IWC_OK) ? greet(self, deadline_us) : result);
 }
 
 int iwc_fd(const iwc_t *self) {
@@ -305,7 +317,10 @@ const char *iwc_error(const iwc_t *self) {
 }
 
 const char *iwc_reason(const iwc_t *self) {
-    return self->reason;
+    if (self == NULL) {
+        return "there is no handle, because iwc_new found no memory";
+    }
+    return (self->failed == IWC_REFUSED) ? self->reason : iwc_words(self->failed);
 }
 
 void iwc_let_in(iwc_t *self, const sigset_t *mask) {
@@ -314,6 +329,11 @@ void iwc_let_in(iwc_t *self, const sigset_t *mask) {
         self->mask = *mask;
         self->let_in = &self->mask;
     }
+}
+
+/// Returns true if the connection continues: no message has come yet.
+static bool is_waiting(iwc_result_t result) {
+    return result == IWC_TIMEOUT || result == IWC_INTERRUPTED;
 }
 
 iwc_result_t iwc_next(iwc_t *self, int timeout_ms, iwc_message_t *out_message) {
@@ -329,7 +349,7 @@ iwc_result_t iwc_next(iwc_t *self, int timeout_ms, iwc_message_t *out_message) {
             result = IWC_TIMEOUT; // Data continues to arrive, but no message for the caller.
         }
         if (result != IWC_OK) {
-            return result;
+            return is_waiting(result) ? result : iwc_note(self, result);
         }
     }
 }
@@ -340,5 +360,5 @@ iwc_result_t iwc_latest(iwc_t *self) {
         result = iwc_fill(self);
     }
     iwc_queue_thin(self);
-    return (result == IWC_TIMEOUT) ? IWC_OK : result;
+    return is_waiting(result) ? IWC_OK : iwc_note(self, result);
 }

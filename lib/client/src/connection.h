@@ -37,6 +37,7 @@ struct iwc {
     size_t whole;
     size_t end;
     char path[sizeof(((struct sockaddr_un *)NULL)->sun_path)];
+    iwc_result_t failed; ///< Result of the last call that failed; IWC_OK: none has failed on this connection.
     char error[64];
     char reason[1024];
     iwc_stored_t stored;
@@ -66,8 +67,11 @@ iwc_result_t iwc_put(iwc_t *self, const char *line, size_t length, int64_t deadl
 /// Ends the connection with that result. Received messages stay.
 void iwc_end(iwc_t *self, iwc_result_t result);
 
+/// Stores a result that is a failure for `iwc_reason`. Returns the result.
+iwc_result_t iwc_note(iwc_t *self, iwc_result_t result);
+
 /// Stores name and message of a refusal for `iwc_error` and `iwc_reason`.
-void iwc_keep_refusal(iwc_t *self, const iwc_message_t *reply);
+void iwc_store_refusal(iwc_t *self, const iwc_message_t *reply);
 
 /// Sends a stop request through a connection of its own, to one of the gateway's two sockets: client_stop.c.
 iwc_result_t iwc_stop_by(iwc_t *self, const char *path, const char *request, int timeout_ms);

@@ -77,14 +77,14 @@ iwc_result_t iwc_recording(iwc_t *self, const char *name, int timeout_ms, void *
     char request[160];
     iwc_message_t reply;
     if (!is_name(name) || piece->next < 0) {
-        return IWC_INVALID;
+        return iwc_note(self, IWC_INVALID);
     }
     (void)snprintf(request, sizeof request, "{\"cmd\":\"recording\",\"name\":\"%s\",\"offset\":%" PRId64 "}", name,
                    piece->next);
     const iwc_result_t result = iwc_ask(self, request, timeout_ms, &reply);
     if (result == IWC_OK && !iwc_piece_take(&reply, out, piece)) {
         iwc_close(self); // Nothing that comes after it is reliable.
-        return IWC_GARBLED;
+        return iwc_note(self, IWC_GARBLED);
     }
     return result;
 }

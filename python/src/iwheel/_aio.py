@@ -18,7 +18,7 @@ from collections.abc import AsyncIterator, Generator, Mapping
 
 from ._connection import EVENTS_KEPT, ends_in_children
 from ._errors import GatewayUnavailable, IWheelError, LeaseEnded, NoAnswer, ProtocolError, Refused
-from ._protocol import Configured, Confirmed, Hello, Piece, RecordingEntry, State, Status, Stop, Tared, Watched
+from ._protocol import Configured, Confirmed, Hello, OnRequest, Piece, RecordingEntry, State, Status, Stop, Tared, Watched
 from ._stop import stop_by_either
 from ._types import Applied, Event, OnStatus, Terms, Whole
 from ._wire import (
@@ -202,7 +202,7 @@ class _Stream(asyncio.Protocol):
         if len(self.events) >= EVENTS_KEPT:
             self.events.popleft()
             self._lost += 1
-        self.events.append(message)
+        self.events.append(cast(Event, message))
         self.came.set()
 
     def _no_answer(self, future: asyncio.Future[Message], cmd: str, timeout: float) -> None:
@@ -311,6 +311,9 @@ class AsyncGateway:
         while not add_piece(data, cast(Piece, await self._ask("recording", name=name, offset=len(data)))):
             pass
         return bytes(data)
+
+    async def record(self, on: bool) -> OnRequest:
+        return cast(OnRequest, without_envelope(await self._ask("record", on=bool(on))))
 
     async def watch(self, *topics: str, rate_hz: Whole | None = None) -> Watched:
         fields = {"topics": list(topics), **integers(rate_hz=rate_hz)}

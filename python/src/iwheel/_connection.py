@@ -11,7 +11,7 @@ import socket
 import time
 import weakref
 from collections import deque
-from typing import Any, Protocol
+from typing import Any, Protocol, cast
 from collections.abc import Mapping
 
 from ._errors import GatewayUnavailable, NoAnswer, ProtocolError
@@ -206,7 +206,7 @@ class Connection:
         if len(self.events) >= EVENTS_KEPT:
             self.events.popleft()
             self._lost += 1
-        self.events.append(message)
+        self.events.append(cast(Event, message))
 
 
 _alive: weakref.WeakSet[_Left] = weakref.WeakSet()

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import math
+import os
 import threading
 import time
 import warnings
@@ -13,7 +15,8 @@ from collections.abc import Iterator
 
 from ._connection import Connection
 from ._errors import GatewayUnavailable, IWheelError, LeaseEnded, NoAnswer, ProtocolError, Refused
-from ._protocol import Configured, Confirmed, Hello, Piece, RecordingEntry, State, Status, Stop, Tared, Watched
+from ._protocol import Configured, Confirmed, Hello, OnRequest, Piece, RecordingEntry, State, Status, Stop, Tared, Watched
+from ._record import record
 from ._stop import stop_by_either
 from ._types import Applied, Event, OnStatus, Terms, Whole
 from ._wire import (
@@ -99,6 +102,10 @@ class Gateway:
             pass
         return bytes(data)
 
+    def record(self, on: bool) -> OnRequest:
+        """Begins or ends the recording on request on the gateway's disk. It moves nothing."""
+        return cast(OnRequest, without_envelope(self._ask("record", on=bool(on))))
+
     def watch(self, *topics: str, rate_hz: Whole | None = None) -> Watched:
         """Subscribes to topics of `state bus estop lease stop force frame`, instead of those before. Then read `events`.
 
@@ -123,6 +130,14 @@ class Gateway:
             if event is None:
                 return
             yield event
+
+    def record(self, path: str | os.PathLike[str], seconds: float = math.inf) -> int:
+        """Writes all frames of the bus to a new file, in the form of candump -L, for that time or until Ctrl-C (KeyboardInterrupt). Moves nothing.
+
+        Returns the number of frames. It continues after a lost connection; a comment in the file marks missing frames. `read_recording` reads the
+        file. It replaces the subscription of `watch`, and ends it.
+        """
+        return record(self, path, seconds)
 
     # Stopping: always allowed ----------------------------------------------------------------------------------------
 

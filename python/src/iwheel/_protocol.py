@@ -446,7 +446,7 @@ class RecordingEntry(TypedDict):
     name: str
     """name of its files, without .log, .jsonl or .conf"""
     cause: str
-    """a cause, gateway_died or rolling"""
+    """a cause, gateway_died, rolling or requested"""
     wall_us: int | None
     """time at which its .conf was written, at the stop"""
     log_bytes: int | None
@@ -455,11 +455,33 @@ class RecordingEntry(TypedDict):
     conf_bytes: int | None
 
 
+RecordingEnd = Literal["request", "time", "size", "fault"]
+
+
+class OnRequest(TypedDict):
+    """The recording on request: the reply to `record`, and a part of the reply to `recordings`."""
+
+    on: bool
+    """it is being written, or begins"""
+    name: str | None
+    """name of the last one's files without suffix; None: there is none yet"""
+    ended: RecordingEnd | None
+    """reason for its end; None: not known, or it has not ended"""
+    fault: str | None
+    """the fault of the disk or of the process that writes, with ended fault"""
+    most_ms: int
+    """it ends after this time"""
+    most_bytes: int
+    """it ends at this size of its files"""
+
+
 class Recordings(TypedDict):
     """The reply to `recordings`."""
 
     recordings: list[RecordingEntry]
     """oldest first; if there are more than 64, only the newest"""
+    on_request: OnRequest
+    """state of the recording on request"""
 
 
 class Piece(TypedDict):
@@ -497,3 +519,138 @@ class Configured(TypedDict):
     """a value is staged and not committed"""
     restarts: bool
     """the values were committed, and the gateway restarts"""
+
+
+class HelloEvent(Hello):
+    """The event `hello`: on connect"""
+
+    event: Literal["hello"]
+    t_us: int
+
+
+class StateEvent(Status):
+    """The event `state`: at rate_hz, and immediately when the state changes"""
+
+    event: Literal["state"]
+
+
+class LedgerEvent(Confirmed):
+    """The event `ledger`: an assumption is confirmed or contradicted"""
+
+    event: Literal["ledger"]
+    t_us: int
+
+
+class BusEvent(TypedDict):
+    """The event `bus`: state of the bus changes"""
+
+    event: Literal["bus"]
+    t_us: int
+    state: BusState
+
+
+class _EstopEventPartly(TypedDict, total=False):
+    pressed_at: EstopContact
+
+
+class EstopEvent(_EstopEventPartly):
+    """The event `estop`: the line changes"""
+
+    event: Literal["estop"]
+    t_us: int
+    state: EstopState
+
+
+Change = Literal["gained", "moved", "lost"]
+
+
+class LeaseEvent(TypedDict):
+    """The event `lease`: the lease is gained, moved or lost"""
+
+    event: Literal["lease"]
+    t_us: int
+    change: Change
+    holder: int | None
+    name: str | None
+    former: int | None
+
+
+class StopEvent(StopSummary):
+    """The event `stop`: the wheels are stopped"""
+
+    event: Literal["stop"]
+    t_us: int
+
+
+FaultAlone = Literal["still_moving", "zeros_ending", "battery_low", "temperature_high", "rolling", "setpoint_left"]
+
+
+class FaultEvent(TypedDict):
+    """The event `fault`: a cause comes or goes"""
+
+    event: Literal["fault"]
+    t_us: int
+    cause: Cause | FaultAlone
+    present: bool
+
+
+class RollingEvent(TypedDict):
+    """The event `rolling`: a wheel turns faster than 100 mm/s for 300 ms although the gateway sends nothing to it, or no longer: a person pushes the machine, or it rolls"""
+
+    event: Literal["rolling"]
+    t_us: int
+    present: bool
+
+
+class ForceView(TypedDict):
+    """The force of one wheel, and its zero; the names are those of wheel_status."""
+
+    raw: int | None
+    raw_mN: int | None
+    offset_mN: int | None
+    net_mN: int | None
+    validity: ForceValidity
+    saturated: bool
+    age_ms: int | None
+    provenance: Provenance
+    offset_age_ms: int | None
+    contaminated: bool | None
+    samples: int | None
+    deviation_mN: int | None
+
+
+class ForceEvent(TypedDict):
+    """The event `force`: at rate_hz"""
+
+    event: Literal["force"]
+    t_us: int
+    left: ForceView
+    right: ForceView
+
+
+Side = Literal["left", "right"]
+
+
+class OffsetEvent(TypedDict):
+    """The event `offset`: another zero is in force"""
+
+    event: Literal["offset"]
+    t_us: int
+    side: Side
+    offset_mN: int | None
+    provenance: Provenance
+    before_mN: int | None
+    before_provenance: Provenance
+
+
+class FrameEvent(Frame):
+    """The event `frame`: each received frame, and each echo of the gateway's own frames"""
+
+    event: Literal["frame"]
+
+
+class LostEvent(TypedDict):
+    """The event `lost`: a slow reader has lost events"""
+
+    event: Literal["lost"]
+    count: int

@@ -4,13 +4,58 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, SupportsIndex
+from typing import Literal, SupportsIndex, TypedDict
 from collections.abc import Callable
 
-from ._protocol import Status
+from ._protocol import (
+    BusEvent,
+    EstopEvent,
+    FaultEvent,
+    ForceEvent,
+    FrameEvent,
+    HelloEvent,
+    LeaseEvent,
+    LedgerEvent,
+    LostEvent,
+    OffsetEvent,
+    RollingEvent,
+    StateEvent,
+    Status,
+    StopEvent,
+)
 
-Event = dict[str, Any]
-"""An event as received: `event` is its name. Ignore unknown names and fields."""
+
+class DisconnectedEvent(TypedDict):
+    """This package reports that the connection was lost."""
+
+    event: Literal["disconnected"]
+    message: str
+
+
+class ReconnectedEvent(TypedDict):
+    """This package reports that the gateway is back, with the same subscription."""
+
+    event: Literal["reconnected"]
+
+
+Event = (
+    BusEvent
+    | DisconnectedEvent
+    | EstopEvent
+    | FaultEvent
+    | ForceEvent
+    | FrameEvent
+    | HelloEvent
+    | LeaseEvent
+    | LedgerEvent
+    | LostEvent
+    | OffsetEvent
+    | ReconnectedEvent
+    | RollingEvent
+    | StateEvent
+    | StopEvent
+)
+"""An event as received: `event` is its name. After `if event["event"] == "state":` type checkers know its fields. Ignore unknown names and fields."""
 
 Whole = SupportsIndex | float
 """A whole number of any type: 200, 200.0, numpy.int64(200). The call that uses it refuses 200.5, True and NaN."""

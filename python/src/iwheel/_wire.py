@@ -235,11 +235,11 @@ def newest(events: Iterable[Event]) -> tuple[list[Event], int]:
     kept: dict[tuple[str, ...], Event] = {}
     left_out = 0
     for event in events:
-        name = event["event"]
-        if name == "lost":
+        if event["event"] == "lost":
             left_out += event["count"]
             continue
-        thing = (name, *(str(event.get(field)) for field in DISTINCTIONS.get(name, ())))
+        name = event["event"]
+        thing = (name, *(str(cast(Message, event).get(field)) for field in DISTINCTIONS.get(name, ())))
         left_out += kept.pop(thing, None) is not None
         kept[thing] = event
     return list(kept.values()), left_out

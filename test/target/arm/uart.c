@@ -25,6 +25,10 @@ void brd_serial_dma_start(volatile uint32_t *data, char *buffer, uint32_t length
     ring_length = ring_left = length;
 }
 
+bool brd_serial_dma_receives(void) {
+    return true;
+}
+
 uint32_t brd_serial_dma_left(void) {
     return ring_left;
 }

@@ -3,13 +3,14 @@
 
 from unicorn import arm_const as arm
 
-from . import chip
-from .can import Bus, Controller
+from . import chip, chip_g4
+from .can import Bus, Controller, FdController
 from .lamp import Lamp
 
 BLOCK_SIZE = 0x400
 IRQ_EXTI0, IRQ_TRANSMIT, IRQ_RECEIVE, IRQ_ERROR = 6, 19, 20, 22
 IRQ_SERIAL_RECEIVE, IRQ_SERIAL_TRANSMIT, IRQ_SERIAL = 16, 17, 38
+IRQ_FDCAN = 21
 NO_DEVICE = None, (None, 0), None, None  # Its clock is never on.
 
 
@@ -20,20 +21,24 @@ class Board:
     pins = {"estop": ("port_b", 0), "button": ("port_a", 1)}
     uart_pins, can_pairs = ("port_a", 3, 2), {"PB8": ("port_b", 8, 9), "PA11": ("port_a", 11, 12)}
     ports = ("port_a", "port_b", "port_c", "port_d")
-    without_interrupts = {*ports, "watchdog", "uart"}  # For those of the serial port the code does not wait.
+    uart, controller = chip.Uart, Controller
+    spaces = ((0x40000000, 0x30000),)  # Address and size of what has registers.
+    without_interrupts = {*ports, "watchdog", "uart", "can_ram"}  # For those of the serial port the code does not wait.
 
-    def __init__(self, transceiver="PB8", crystal_hz=None):
-        self.transceiver, self.crystal_hz = self.can_pairs[transceiver], crystal_hz
+    can_default = "PB8"
+
+    def __init__(self, transceiver=None, crystal_hz=None):
+        self.transceiver, self.crystal_hz = self.can_pairs[transceiver or self.can_default], crystal_hz
 
     def build(self, machine, seed):
         machine.clocks = self.clocks(machine)
         machine.clocks.crystal_hz = self.crystal_hz or machine.clocks.crystal_hz
-        machine.exti, machine.watchdog, machine.uart = chip.Exti(), chip.Watchdog(self.lsi_hz), chip.Uart(machine)
+        machine.exti, machine.watchdog, machine.uart = chip.Exti(), chip.Watchdog(machine, self.lsi_hz), self.uart(machine)
         machine.dma, machine.flash = self.dma(machine), self.flash(machine)
         machine.map_flash(machine.flash)
         for name in self.ports:
             setattr(machine, name, self.port())
-        machine.can = Controller(machine)
+        machine.can = self.controller(machine)
         machine.bus = Bus(machine, seed)
         machine.can_listens = False  # Clocked and on its pins.
         machine.lamp = Lamp(*self.lamp)
@@ -54,10 +59,10 @@ class Board:
             *(getattr(machine, name) for name in self.ports),
         ):
             part.reset()
-        self.remap = 0
+        self.remap, self.multiplexer = 0, {}
         machine.can_listens = False
 
-    remap = 0  # AFIO_MAPR
+    remap, multiplexer = 0, {}  # AFIO_MAPR, DMAMUX
 
     def drive(self, what, level):
         """Something outside drives a pin; None: nothing but the pin's own pull-up does."""
@@ -78,16 +83,16 @@ class Board:
 
     def interrupts(self, machine):
         """The interrupts whose lines are up, each a bit."""
-        lines = machine.can.lines()
         return (
-            (lines & 1) << IRQ_TRANSMIT
-            | (lines >> 1 & 1) << IRQ_RECEIVE
-            | (lines >> 2 & 1) << IRQ_ERROR
+            self.can_interrupts(machine.can.lines())
             | machine.exti.line() << IRQ_EXTI0
             | machine.dma.receive.line() << IRQ_SERIAL_RECEIVE
             | machine.dma.transmit.line() << IRQ_SERIAL_TRANSMIT
             | machine.uart.line() << IRQ_SERIAL
         )
+
+    def can_interrupts(self, lines):
+        return (lines & 1) << IRQ_TRANSMIT | (lines >> 1 & 1) << IRQ_RECEIVE | (lines >> 2 & 1) << IRQ_ERROR
 
     def connect_can(self):
         machine = self.machine
@@ -116,6 +121,8 @@ class Board:
             "uart": (machine.uart.read, machine.uart.write),
             "dma": (machine.dma.read, machine.dma.write),
             "can": (machine.can.read, machine.can.write),
+            "can_ram": (lambda offset: machine.can.read(BLOCK_SIZE + offset), lambda offset, value: machine.can.write(BLOCK_SIZE + offset, value)),
+            "multiplexer": (lambda offset: self.multiplexer.get(offset, 0), lambda offset, value: self.multiplexer.update({offset: value})),
         }[name]
 
     def write_port(self, port, offset, value):
@@ -210,4 +217,37 @@ class Stm32f446(Stm32f407):
     name, clocks, lamp = "stm32f446", chip.ClocksF446, ("port_a", 5, 1)
 
 
-BOARDS = {board.name: board for board in (Stm32f103, Stm32f407, Stm32f446)}
+class Stm32g474(Board):
+    """Nucleo-G474RE. PB8 is BOOT0: with the transceiver there the chip would start its ROM."""
+
+    name, cpu_model, banks, lsi_hz, lsi_limits_hz = "stm32g474", arm.UC_CPU_ARM_CORTEX_M4, 0, 32_000, (29_500, 34_000)
+    dma, flash, unique_id_address, uart, controller = chip_g4.DmaG4, chip_g4.FlashG4, 0x1FFF7590, chip_g4.UartG4, FdController
+    clocks, port, lamp, can_default = chip_g4.ClocksG4, chip_g4.PortG4, ("port_a", 5, 1), "PA11"
+    ram_size = 96 * 1024
+    spaces = ((0x40000000, 0x30000), (0x48000000, 0x2000))
+    blocks = {
+        0x40021000: ("rcc", None),
+        0x40022000: ("flash", None),
+        0x40003000: ("watchdog", None),
+        0x40010000: ("selection", (0x60, 0)),
+        0x40010400: ("exti", None),
+        0x48000000: ("port_a", (0x4C, 0)),
+        0x48000400: ("port_b", (0x4C, 1)),
+        0x48000800: ("port_c", (0x4C, 2)),
+        0x48000C00: ("port_d", (0x4C, 3)),
+        0x40020000: ("dma", (0x48, 0)),
+        0x40020800: ("multiplexer", (0x48, 2)),
+        0x40004400: ("uart", (0x58, 17)),
+        0x40006400: ("can", (0x58, 25)),
+        0x4000A400: ("can_ram", (0x58, 25)),
+    }
+
+    def __init__(self, transceiver=None, crystal_hz=None):
+        super().__init__(transceiver, crystal_hz)
+        self.multiplexer = {}
+
+    def can_interrupts(self, lines):
+        return lines << IRQ_FDCAN
+
+
+BOARDS = {board.name: board for board in (Stm32f103, Stm32f407, Stm32f446, Stm32g474)}

@@ -19,6 +19,7 @@ class RawFrame(ctypes.Structure):
 
 
 def load_model(path):
+    """The models of both controllers, which have the same functions."""
     library = ctypes.CDLL(str(path))
     pointer, number, frame = ctypes.c_void_p, ctypes.c_uint32, ctypes.POINTER(RawFrame)
     for name, result, arguments in (
@@ -40,8 +41,9 @@ def load_model(path):
         ("violation", ctypes.c_char_p, [pointer]),
         ("overruns", number, [pointer]),
     ):
-        function = getattr(library, f"bxcan_model_{name}")
-        function.restype, function.argtypes = result, arguments
+        for kind in ("bxcan", "fdcan"):
+            function = getattr(library, f"{kind}_model_{name}")
+            function.restype, function.argtypes = result, arguments
     return library
 
 
@@ -84,10 +86,12 @@ class Frame:
 class Controller:
     """The chip's bxCAN: the model of the driver's host tests, and what BTR makes of the chip's clock."""
 
+    kind = "bxcan"
+
     library = None  # Set by the runner, see load_model.
 
     def __init__(self, machine):
-        self.machine, self.model = machine, self.library.bxcan_model_create(machine.board.banks)
+        self.machine, self.model = machine, getattr(self.library, f"{self.kind}_model_create")(machine.board.banks)
         for name in (
             "read",
             "write",
@@ -105,10 +109,16 @@ class Controller:
             "overruns",
             "slow_aborts",
         ):
-            setattr(self, name, functools.partial(getattr(self.library, f"bxcan_model_{name}"), self.model))
+            setattr(self, name, functools.partial(getattr(self.library, f"{self.kind}_model_{name}"), self.model))
 
     def reset(self):
-        self.library.bxcan_model_reset(self.model, self.machine.board.banks)
+        getattr(self.library, f"{self.kind}_model_reset")(self.model, self.machine.board.banks)
+
+    def is_passive(self):
+        return bool(self.read(0x18) & 2)  # ESR.EPVF
+
+    def is_silent(self):
+        return bool(self.read(0x1C) >> 31)  # BTR.SILM
 
     def timing(self):
         """(bit rate in Hz, sample point in permille), decoded from BTR and the clock tree."""
@@ -119,8 +129,7 @@ class Controller:
 
     def understands(self):
         """Crystal-exact 1 Mbit/s."""
-        from_crystal = self.machine.clocks.cfgr >> 2 & 3 and self.machine.clocks.pll_from_hse()
-        return bool(from_crystal) and self.timing()[0] == 1_000_000
+        return self.machine.clocks.runs_from_crystal() and self.timing()[0] == 1_000_000
 
     def offered(self):
         raw = RawFrame()
@@ -136,6 +145,24 @@ class Controller:
         for at, byte in enumerate(frame.data):
             raw.data[at] = byte
         return self.receive(ctypes.byref(raw))
+
+
+class FdController(Controller):
+    """FDCAN: the same with NBTP, and the clock of its kernel."""
+
+    kind = "fdcan"
+
+    def timing(self):
+        nbtp = self.read(0x1C)
+        before, after = (nbtp >> 8 & 0xFF) + 1, (nbtp & 0x7F) + 1
+        quanta = 1 + before + after
+        return self.machine.clocks.can_hz() / ((nbtp >> 16 & 0x1FF) + 1) / quanta, 1000 * (1 + before) / quanta
+
+    def is_passive(self):
+        return self.read(0x40) & 0x80FF >= 0x80  # ECR: RP, or TEC of 128. A read of PSR would clear its flags.
+
+    def is_silent(self):
+        return bool(self.read(0x18) & 0x20)  # CCCR.MON
 
 
 @dataclass
@@ -314,7 +341,7 @@ class Bus:
         understood = self.machine.can.understands() and not self.corrupt_chip and self.cut != "receiver"
         received = any(wheel.powered for wheel in self.wheels) and self.acknowledge_chip and not self.cut
         self.machine.can.end(mailbox, BIT_ERROR if not understood else SENT if received else NO_ACKNOWLEDGEMENT)
-        if self.machine.can.read(0x18) & 2:  # ESR.EPVF
+        if self.machine.can.is_passive():
             self.suspended_ns = self.idle_ns + 8 * BIT_NS
         return understood and received
 

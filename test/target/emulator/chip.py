@@ -28,7 +28,7 @@ class Clocks:
     def reset(self):
         self.cr, self.cfgr, self.acr = 0x83, 0, self.acr_reset
         self.pllcfgr = 0x24003010
-        self.enable = {}
+        self.enable, self.acr_is_read = {}, False
         self.hse_ready_ns = self.pll_ready_ns = None
         self.core_hz, self.settled = self.internal_hz, False
 
@@ -60,6 +60,10 @@ class Clocks:
         self.cfgr = self.cfgr & ~0xC | switched << 2
         self.core_hz = (self.internal_hz, self.crystal_hz, self.pll_hz() if switched == 2 else 0)[switched]
 
+    def runs_from_crystal(self):
+        """The core runs on the PLL, and the PLL on the crystal."""
+        return bool(self.cfgr >> 2 & 3) and self.pll_from_hse()
+
     def read(self, offset, now_ns):
         if not self.settled:
             self.update(now_ns)
@@ -78,6 +82,7 @@ class Clocks:
         elif offset == self.csr_offset:
             self.flags = 0 if value & RMVF else self.flags
         elif offset == self.cfgr_offset:
+            self.expect(self.acr_is_read or value & 3 != 2, "the wait states were not read back before the clock rises")
             self.write_cfgr(value)
         elif offset == self.pllcfgr_offset:
             self.expect(not self.cr & PLLON, "the PLL was changed while it runs")
@@ -93,6 +98,18 @@ class Clocks:
         self.update(now_ns)
         if self.cfgr & 3 == 2:
             self.check_limits()
+
+    def write_acr(self, value):
+        """FLASH_ACR. RM0008 3.3.3: prefetch changes only up to 24 MHz; RM0090 3.9.1: the data cache is reset only while it is off."""
+        self.expect(not (value ^ self.acr) & self.prefetch or self.core_hz <= self.prefetch_max_hz, "prefetch was changed at a fast clock")
+        self.expect(not value & self.cache_reset or not value & self.cache_on, "the data cache was reset while it is on")
+        self.acr = value & ~self.acr_without
+        self.acr_is_read = not self.must_read_acr
+        self.check_limits()
+
+    def read_acr(self):
+        self.acr_is_read = True
+        return self.acr
 
     def write_cfgr(self, value):
         if (value ^ self.cfgr) & self.pll_bits:
@@ -110,6 +127,7 @@ class ClocksF1(Clocks):
     internal_hz, csr_offset, cfgr_offset, pllcfgr_offset, acr_reset = 8_000_000, 0x24, 0x04, None, 0x30
     apb1_reset_offset = 0x10
     pll_bits = 0x3F0000
+    prefetch, prefetch_max_hz, cache_on, cache_reset, acr_without, must_read_acr = 1 << 4, 24_000_000, 0, 0, 1 << 5, False
 
     def pll_from_hse(self):
         return bool(self.cfgr >> 16 & 1)
@@ -133,6 +151,9 @@ class ClocksF4(Clocks):
     pll_bits = 0
     core_max_hz, apb1_max_hz, apb2_max_hz = 168_000_000, 42_000_000, 84_000_000
     reserved, reserved_value = 0xF << 28, 2 << 28  # Reserved bits of PLLCFGR, unchanged since reset.
+    prefetch, prefetch_max_hz, cache_on, cache_reset, acr_without = 1 << 8, 1 << 40, 1 << 10, 1 << 12, 0x1800
+    must_read_acr = True  # RM0090 3.5.1
+    may_prefetch = False  # ES0182: revision A does not support it, and its identifier is wrong too.
 
     def pll_from_hse(self):
         return bool(self.pllcfgr >> 22 & 1)
@@ -158,6 +179,7 @@ class ClocksF4(Clocks):
         self.expect(self.apb1_hz() <= self.apb1_max_hz, f"APB1 runs at {self.apb1_hz()} Hz")
         self.expect(self.apb2_hz() <= self.apb2_max_hz, f"APB2 runs at {self.apb2_hz()} Hz")
         self.expect((self.acr & 0xF) >= (self.core_hz - 1) // 30_000_000, "too few wait states of the flash")
+        self.expect(self.may_prefetch or not self.acr & self.prefetch, "prefetch is on, which revision A of an F407 cannot")
 
 
 class ClocksF446(ClocksF4):
@@ -165,6 +187,7 @@ class ClocksF446(ClocksF4):
 
     core_max_hz, apb1_max_hz, apb2_max_hz = 168_000_000, 45_000_000, 90_000_000
     reserved, reserved_value = 1 << 31, 0
+    may_prefetch = True
 
 
 class Port:
@@ -297,8 +320,11 @@ class Exti:
 
 
 class Uart:
-    """USART2 with somebody at its other end. `sent`: what the chip said; `send`: what is said to it. Bytes pass one by one through DR, or
-    through the DMA; the emulator updates the DMA at each access."""
+    """USART2 with a peer. `sent`: the bytes from the chip; `send` passes bytes to the chip. Bytes pass one by one through DR, or through the DMA;
+    what the DMA carries is brought up to date at each access.
+
+    The transmitter has DR and a shift register: a byte that is written leaves DR when the one before it has left. TC is set when both are empty
+    and stays set until code clears it (RM0008 27.6.1): the DMA does not. A reset cuts the bytes that are not whole on the line."""
 
     baud = 115200
 
@@ -308,7 +334,12 @@ class Uart:
 
     def reset(self):
         self.brr = self.cr1 = self.cr3 = 0
+        whole_from = getattr(self, "free_ns", 0) - self.chip.now_ns
+        if whole_from > 0:
+            del self.sent[-whole_from // self.byte_ns() :]
         self.free_ns = self.came_ns = 0  # The transmitter is free; the next byte from outside is there.
+        self.clear_ns = None  # TC was cleared then; None: it is set.
+        self.is_full = False  # A received byte is in DR, because the DMA has not read it.
         self.idle_ns, self.flags, self.noisy, self.said_sr = None, 0, 0, False
 
     def send(self, text):
@@ -322,6 +353,18 @@ class Uart:
 
     def byte_ns(self):
         return 10 * 10**9 // self.baud
+
+    def is_complete(self, at_ns):
+        """TC. The DMA must be up to date."""
+        if self.clear_ns is not None and self.clear_ns < self.free_ns <= at_ns:
+            self.clear_ns = None
+        return self.clear_ns is None
+
+    def transmit(self, bytes_, at_ns):
+        """Bytes that go to DR one after another from that time on, each as soon as it is empty."""
+        self.is_complete(at_ns)
+        self.sent += bytes_
+        self.free_ns = max(self.free_ns, at_ns) + len(bytes_) * self.byte_ns()
 
     def by_dma(self):
         return self.cr3 & 0x40 and self.cr1 & 0x2004 == 0x2004
@@ -339,7 +382,8 @@ class Uart:
             byte = self.typed.pop(0)
             if self.noisy:
                 self.noisy, byte, self.flags = self.noisy - 1, byte ^ 0x55, self.flags | 4
-            self.chip.dma.receive.put(byte)
+            if not self.chip.dma.receive.put(byte):
+                self.flags, self.is_full = self.flags | 8 * self.is_full, True
             self.idle_ns = self.came_ns + self.byte_ns()
             self.came_ns += self.byte_ns()
         if self.idle_ns is not None and self.idle_ns <= now_ns and not self.typed:
@@ -357,25 +401,32 @@ class Uart:
     def read(self, offset):
         now_ns = self.chip.now_ns
         self.advance(now_ns)
+        self.chip.dma.advance(now_ns)
         received = self.typed and self.cr1 & 4 and not self.by_dma() and now_ns >= self.came_ns
         if offset == 0:
             self.said_sr = True
-            return self.flags | (0xC0 if now_ns >= self.free_ns else 0) | (0x20 if received else 0)
+            empty = now_ns >= self.free_ns - self.byte_ns()
+            return self.flags | 0x80 * empty | 0x40 * self.is_complete(now_ns) | (0x20 if received else 0)
         if offset == 4 and received:
             self.came_ns = now_ns + self.byte_ns()
             return self.typed.pop(0)
         if offset == 4:
             self.flags = 0 if self.said_sr else self.flags
-            self.said_sr = False
+            self.said_sr = self.is_full = False
         return {8: self.brr, 0xC: self.cr1, 0x14: self.cr3}.get(offset, 0)
 
     def write(self, offset, value):
         now_ns = self.chip.now_ns
         if offset == 4:
             self.check_line()
-            self.chip.expect(now_ns >= self.free_ns, "a character was overwritten")
-            self.sent.append(value & 0xFF)
-            self.free_ns = now_ns + self.byte_ns()
+            self.chip.expect(now_ns >= self.free_ns - self.byte_ns(), "a character was overwritten")
+            self.transmit(bytes((value & 0xFF,)), now_ns)
+            self.clear_ns = now_ns if self.said_sr else self.clear_ns
+        elif offset == 0:
+            if not value & 0x40:
+                self.chip.dma.advance(now_ns)
+                self.is_complete(now_ns)
+                self.clear_ns = now_ns
         elif offset == 8:
             self.brr = value
         elif offset == 0xC:
@@ -391,7 +442,7 @@ class DmaChannel:
         self.chip = chip
         self.registers = dict.fromkeys(self.offsets, 0)
         self.left = self.length = 0
-        self.half = self.end = False
+        self.half = self.end = self.error = False
 
     def control(self):
         return self.registers["control"]
@@ -399,10 +450,13 @@ class DmaChannel:
     def is_on(self):
         return bool(self.control() & 1)
 
+    def data_register(self):
+        return 0x40004404
+
     def begin(self):
         self.left = self.length = self.registers["count"]
-        self.start_ns = max(self.chip.now_ns, self.chip.uart.free_ns)
-        self.chip.expect(self.registers["peripheral"] == 0x40004404, "the DMA does not serve the USART's data register")
+        self.begun_ns = self.chip.now_ns
+        self.chip.expect(self.registers["peripheral"] == self.data_register(), "the DMA does not serve the USART's data register")
         self.chip.expect(
             self.registers["memory"] >= 0x20000000 and self.registers["memory"] + self.length <= 0x20000000 + self.chip.board.ram_size,
             "the DMA reaches where no RAM is",
@@ -410,7 +464,7 @@ class DmaChannel:
 
     def put(self, byte):
         if not self.is_on() or not self.left:
-            return  # The byte stays in the data register, and the next one overwrites it.
+            return False  # The byte stays in the data register, and the next one is an overrun.
         self.chip.cpu.mem_write(self.registers["memory"] + self.length - self.left, bytes((byte,)))
         self.left -= 1
         self.half |= self.left == self.length // 2
@@ -418,21 +472,30 @@ class DmaChannel:
             self.finish()
         if self.left == 0 and self.control() & self.CIRCULAR:  # RM0008 13.3.3, RM0090 10.3.9: else the channel serves no further request.
             self.left = self.length
+        return True
 
     def until_event(self):
         return max(self.left - self.length // 2 if self.left > self.length // 2 else self.left, 1)
 
+    def next_move_ns(self):
+        """DR is empty."""
+        return max(self.begun_ns, self.chip.uart.free_ns - self.chip.uart.byte_ns())
+
     def carry(self, now_ns):
-        """From memory to the line."""
+        """From memory to DR."""
         uart = self.chip.uart
-        if self.is_on() and self.left and self.start_ns <= now_ns:
-            count = min(self.left, (now_ns - self.start_ns) // uart.byte_ns() + 1)
-            uart.sent += self.chip.cpu.mem_read(self.registers["memory"] + self.length - self.left, count)
+        while self.is_on() and self.left and self.next_move_ns() <= now_ns:
+            count = min(self.left, (now_ns - self.next_move_ns()) // uart.byte_ns() + 1)
+            uart.transmit(self.chip.cpu.mem_read(self.registers["memory"] + self.length - self.left, count), self.next_move_ns())
             self.left -= count
-            self.start_ns += count * uart.byte_ns()
-            uart.free_ns = self.start_ns
             if self.left == 0:
                 self.finish()
+
+    def fail(self):
+        """A bus error: RM0008 13.3.4, RM0090 10.3.18: TEIF is set, and the hardware disables the channel."""
+        self.error = True
+        self.registers["control"] &= ~1
+        self.chip.touch()
 
     def finish(self):
         self.end = True
@@ -440,20 +503,20 @@ class DmaChannel:
     def next_event_ns(self):
         if not self.is_on() or not self.left:
             return None
-        return self.start_ns + (self.left - 1) * self.chip.uart.byte_ns()
+        return self.next_move_ns() + max(self.left - 2, 0) * self.chip.uart.byte_ns()
 
     def line(self):
-        return bool((self.half and self.control() & self.HALF) or (self.end and self.control() & self.END))
+        return bool((self.half and self.control() & self.HALF) or (self.end and self.control() & self.END) or (self.error and self.control() & self.ERROR))
 
 
 class ChannelF1(DmaChannel):
     offsets = ("control", "count", "peripheral", "memory")
-    HALF, END, FROM_MEMORY, CIRCULAR, WANTED = 4, 2, 0x10, 0x20, 0x80
+    HALF, END, ERROR, FROM_MEMORY, CIRCULAR, WANTED = 4, 2, 8, 0x10, 0x20, 0x80
 
 
 class StreamF4(DmaChannel):
     offsets = ("control", "count", "peripheral", "memory", "memory1", "fifo")
-    HALF, END, FROM_MEMORY, CIRCULAR, WANTED = 8, 0x10, 0x40, 0x100, 4 << 25 | 0x400
+    HALF, END, ERROR, FROM_MEMORY, CIRCULAR, WANTED = 8, 0x10, 4, 0x40, 0x100, 4 << 25 | 0x400
 
     def finish(self):
         self.end = True
@@ -498,6 +561,7 @@ class Dma:
             for channel, bit in zip((self.receive, self.transmit), self.bits, strict=True):
                 channel.half &= not value >> bit[0] & 1
                 channel.end &= not value >> bit[1] & 1
+                channel.error &= not value >> bit[2] & 1
             return
         channel, name = self.find(offset)
         if channel is None:
@@ -509,21 +573,23 @@ class Dma:
         if name == "count":
             channel.left = value
         if name == "control" and value & 1 and not was_on:
-            self.chip.expect(not channel.end or self.kind is ChannelF1, "a stream was enabled with the flags of its last run")
+            flags = channel.end or channel.half or channel.error
+            self.chip.expect(not flags or self.kind is ChannelF1, "a stream was enabled with the flags of its last run")
             self.chip.expect(value & channel.WANTED == channel.WANTED, f"a channel of the DMA is not set up for a serial port: {value:#x}")
             self.chip.expect(bool(value & channel.FROM_MEMORY) == (channel is self.transmit), "a channel of the DMA works the wrong way round")
             channel.begin()
             if channel is self.transmit:
                 self.chip.uart.check_line()
                 self.chip.expect(self.chip.uart.cr3 & 0x80, "the serial port does not ask the DMA for bytes to send")
+                self.chip.expect(not self.chip.uart.is_complete(self.chip.now_ns), "TC was not cleared before the DMA sends (RM0008 27.3.13)")
 
 
 class DmaF1(Dma):
-    kind, bases, clear_offset, bits = ChannelF1, (0x6C, 0x80), 4, ((22, 21), (26, 25))
+    kind, bases, clear_offset, bits = ChannelF1, (0x6C, 0x80), 4, ((22, 21, 23), (26, 25, 27))
 
 
 class DmaF4(Dma):
-    kind, bases, clear_offset, bits = StreamF4, (0x88, 0xA0), 0xC, ((10, 11), (20, 21))
+    kind, bases, clear_offset, bits = StreamF4, (0x88, 0xA0), 0xC, ((10, 11, 9), (20, 21, 19))
 
 
 class Flash:
@@ -574,16 +640,17 @@ class Flash:
         at = address - self.base
         self.chip.expect(0 <= at < self.size, f"0x{address:08X} of the flash was erased, which is outside the stored records")
         self.operations, self.erasures = self.operations + 1, self.erasures + 1
-        cut = self.is_cut()
+        deadline_ns = self.chip.watchdog.deadline_ns
+        cut = self.is_cut() or (deadline_ns is not None and deadline_ns < self.chip.now_ns + self.erase_ns)
         self.memory[at : at + size] = bytes(old | 0xA5 for old in self.memory[at : at + size]) if cut else b"\xff" * size
         self.spend_ns(self.erase_ns)
 
     def read(self, offset):
-        return {0: self.chip.clocks.acr, 0xC: self.sr, 0x10: self.cr, 0x14: self.ar}.get(offset, 0)
+        return self.chip.clocks.read_acr() if offset == 0 else {0xC: self.sr, 0x10: self.cr, 0x14: self.ar}.get(offset, 0)
 
     def write(self, offset, value):
         if offset == 0:
-            self.chip.clocks.acr = value & ~0x1800
+            self.chip.clocks.write_acr(value)
         elif offset == 4:
             self.keys = ([*self.keys, value])[-2:]
             self.cr &= ~self.lock if self.keys == [0x45670123, 0xCDEF89AB] else ~0
@@ -612,6 +679,10 @@ class FlashF4(Flash):
 
     base, size, lock, unit, program_ns, erase_ns = 0x08010000, 0x30000, 1 << 31, 4, 100 * US, 2000 * MS
 
+    def read(self, offset):
+        """OPTCR: as delivered; WDG_SW is 0 if the hardware starts the watchdog."""
+        return 0x0FFFAAED & ~(0x20 * self.chip.watchdog.by_hardware) if offset == 0x14 else super().read(offset)
+
     def poll(self):
         sector = self.cr >> 3 & 0xF
         if self.cr & 0x10002 == 0x10002:
@@ -620,28 +691,35 @@ class FlashF4(Flash):
 
 
 class Watchdog:
-    """IWDG. Prescaler and reload need 5 cycles of its oscillator; SR shows it."""
+    """IWDG. Prescaler and reload take 5 cycles of its oscillator; SR shows it, and a write meanwhile is lost. `by_hardware`: an option byte starts it at
+    each reset."""
 
-    def __init__(self, lsi_hz):
-        self.lsi_hz = lsi_hz
+    by_hardware = False
+
+    def __init__(self, chip, lsi_hz):
+        self.chip, self.lsi_hz = chip, lsi_hz
         self.reset()
 
     def reset(self):
-        self.prescaler, self.reload, self.unlocked, self.deadline_ns, self.busy_until_ns = 0, 0xFFF, False, None, 0
+        self.prescaler, self.reload, self.unlocked, self.deadline_ns, self.busy_until_ns = 0, 0xFFF, False, None, {4: 0, 8: 0}
+        if self.by_hardware:
+            self.deadline_ns = self.chip.now_ns + self.timeout_ns()
 
     def timeout_ns(self):
         return (self.reload + 1) * (4 << self.prescaler) * 10**9 // self.lsi_hz
 
     def read(self, offset, now_ns):
-        return {4: self.prescaler, 8: self.reload, 0xC: 3 if now_ns < self.busy_until_ns else 0}.get(offset, 0)
+        status = (now_ns < self.busy_until_ns[4]) | (now_ns < self.busy_until_ns[8]) << 1
+        return {4: self.prescaler, 8: self.reload, 0xC: status}.get(offset, 0)
 
     def write(self, offset, value, now_ns):
         if offset == 0:
             self.unlocked = value == 0x5555
             if value == 0xCCCC or (value == 0xAAAA and self.deadline_ns is not None):
                 self.deadline_ns = now_ns + self.timeout_ns()
-        elif self.unlocked:
-            self.busy_until_ns = now_ns + 5 * 10**9 // self.lsi_hz
+        elif self.unlocked and offset in self.busy_until_ns:
+            self.chip.expect(now_ns >= self.busy_until_ns[offset], "a register of the watchdog was written during its update")
+            self.busy_until_ns[offset] = now_ns + 5 * 10**9 // self.lsi_hz
             if offset == 4:
                 self.prescaler = value & 7
             elif offset == 8:

@@ -10,14 +10,17 @@ import struct
 
 from unicorn import (
     UC_ARCH_ARM,
+    UC_ERR_FETCH_PROT,
     UC_ERR_FETCH_UNMAPPED,
     UC_ERR_OK,
     UC_ERR_READ_UNMAPPED,
+    UC_ERR_WRITE_PROT,
     UC_ERR_WRITE_UNMAPPED,
     UC_HOOK_BLOCK,
     UC_HOOK_INTR,
     UC_MODE_MCLASS,
     UC_MODE_THUMB,
+    UC_PROT_READ,
     Uc,
     UcError,
 )
@@ -25,7 +28,7 @@ from unicorn import arm_const as arm
 from unicorn.unicorn_py3.unicorn import MMIO_READ_CFUNC, MMIO_WRITE_CFUNC, uclib
 
 from .boards import BLOCK_SIZE
-from .chip import IWDGRSTF, PORRSTF, SFTRSTF, US
+from .chip import IWDGRSTF, PINRSTF, PORRSTF, SFTRSTF, US
 from .registers import Registers
 
 ACCESS_CYCLES = 12
@@ -39,7 +42,9 @@ SP, LR, PC, XPSR, PRIMASK = (getattr(arm, f"UC_ARM_REG_{name}") for name in ("SP
 FRAME = (arm.UC_ARM_REG_R0, arm.UC_ARM_REG_R1, arm.UC_ARM_REG_R2, arm.UC_ARM_REG_R3, arm.UC_ARM_REG_R12, LR, PC, XPSR)
 IT_STATE = 0x0600FC00
 NMI, HARD_FAULT, SYSTICK, IRQ = 2, 3, 15, 16
-NO_MEMORY = (UC_ERR_READ_UNMAPPED, UC_ERR_WRITE_UNMAPPED, UC_ERR_FETCH_UNMAPPED)
+FLASH = 0x08000000
+IBUSERR, PRECISERR, STKERR = 1 << 8, 1 << 9 | 1 << 15, 1 << 12  # Of CFSR.
+NO_MEMORY = (UC_ERR_READ_UNMAPPED, UC_ERR_WRITE_UNMAPPED, UC_ERR_WRITE_PROT, UC_ERR_FETCH_UNMAPPED, UC_ERR_FETCH_PROT)
 
 
 class BlockClock(ctypes.Structure):
@@ -57,7 +62,7 @@ class BlockClock(ctypes.Structure):
 
 class Machine:
     library = None  # Holds block_hook; set by the runner.
-    SP = SP
+    SP, PC = SP, PC
     POISON = 0xA5  # Contents of RAM after power-on: anything but zero.
 
     def __init__(self, board, image, seed=1):
@@ -81,13 +86,14 @@ class Machine:
         cpu.mem_write(0x08000000, self.image[: records.start - 0x08000000])  # Its end, texts and no code, may share a page with the records: map_flash.
         cpu.mem_write(ENDLESS, bytes((0xFE, 0xE7)))
         cpu.mem_write(0x20000000, bytes([self.POISON]) * self.board.ram_size)
-        cpu.mem_map(0x1FFF0000, 0x10000)  # Written by the manufacturer: the chip's own number.
+        cpu.mem_map(self.board.unique_id_address & ~0xFFF, 0x1000, UC_PROT_READ)  # The manufacturer wrote it: the chip's own number.
         cpu.mem_write(self.board.unique_id_address, bytes(range(0x41, 0x4D)))
         self.frame, self.after_entry = Registers(cpu, *FRAME, SP, PRIMASK), Registers(cpu, SP, XPSR, LR, PC)
         self.after_exit, self.pc = Registers(cpu, SP, *FRAME), Registers(cpu, PC)
         self.stack, self.result = Registers(cpu, SP), Registers(cpu, *FRAME[:2])
         self.error, self.callbacks, self.until = None, [], NOWHERE
-        self.map_registers(0x40000000, 0x30000, self.board.read, self.board.write)
+        for base, size in self.board.spaces:
+            self.map_registers(base, size, self.board.read, self.board.write)
         self.map_registers(0xE000E000, 0x1000, self.read_system, self.write_system)
         self.clock = BlockClock(stop=ctypes.cast(uclib.uc_emu_stop, ctypes.c_void_p).value)
         for kind, function in ((UC_HOOK_BLOCK, self.library.block_hook), (UC_HOOK_INTR, self.library.trap_hook)):
@@ -127,7 +133,7 @@ class Machine:
         status = uclib.uc_emu_start(self.cpu._uch, pc | 1, self.until, 0, 0)
         if status in NO_MEMORY and self.error is None:
             self.spend()
-            self.hard_fault()
+            self.hard_fault(IBUSERR if status in (UC_ERR_FETCH_UNMAPPED, UC_ERR_FETCH_PROT) else PRECISERR)
             return
         if status != UC_ERR_OK or self.error is not None:
             raise RuntimeError(f"the CPU faulted at 0x{pc:08X}: {self.error or UcError(status)}") from self.error
@@ -135,19 +141,23 @@ class Machine:
         if clock.trap == EXCEPTION_EXIT:
             self.leave_exception()
         elif clock.trap in ABORTS:
-            self.hard_fault()
+            self.hard_fault(IBUSERR if clock.trap == ABORTS[0] else PRECISERR)
         elif clock.trap >= 0:
             raise RuntimeError(f"trap {clock.trap} at 0x{self.pc.read()[0]:08X}")
         elif not clock.has_stopped:
             self.sleeping = True
 
-    def hard_fault(self):
-        """An access where no memory is. Only the HardFault handler handles it. Without a stack the registers cannot be saved, and the
-        handler begins nevertheless."""
+    def hard_fault(self, cause):
+        """An access where no memory is. Only the HardFault handler handles it. Without a stack the registers cannot be saved, and the handler begins
+        nevertheless."""
         self.faults += 1
-        (vector,) = struct.unpack_from("<I", self.image, 4 * HARD_FAULT)
+        self.cfsr |= cause
         self.active, self.sleeping = HARD_FAULT, False
-        self.cpu.reg_write(PC, vector | 1)
+        *values, stack, _ = self.frame.read()
+        stack -= 32
+        if self.is_stack(stack):
+            self.cpu.mem_write(stack, struct.pack("<8I", *values))
+        self.after_entry.write(stack, values[7] & ~IT_STATE, EXC_RETURN, self.vector(HARD_FAULT))
 
     def at(self, time_ns, action):
         """Does something from outside at that time."""
@@ -231,7 +241,8 @@ class Machine:
         if self.watchdog.deadline_ns is not None and self.now_ns >= self.watchdog.deadline_ns:
             self.reset("watchdog", IWDGRSTF)
         if self.power_lost:
-            self.cpu.mem_write(0x20000000, bytes([self.POISON]) * self.board.ram_size)
+            if not self.ram_survives:
+                self.cpu.mem_write(0x20000000, bytes([self.POISON]) * self.board.ram_size)
             self.flash.cut_after, self.flash.next_cut, self.power_lost = self.flash.next_cut, None, False
             self.reset("power", PORRSTF)
         if self.reset_requested:
@@ -267,15 +278,22 @@ class Machine:
         aligned = stack & 4
         stack -= 32 + aligned
         values[7] = values[7] & ~0x200 | (0x200 if aligned else 0)
-        try:
-            self.cpu.mem_write(stack, struct.pack("<8I", *values))
-        except UcError:  # There is no memory for the stack.
-            self.hard_fault()
+        if not self.is_stack(stack):
+            self.hard_fault(STKERR)
             return True
-        (vector,) = struct.unpack_from("<I", self.image, 4 * number)
-        self.after_entry.write(stack, values[7] & ~IT_STATE, EXC_RETURN, vector)  # A handler does not begin within an IT block.
+        self.cpu.mem_write(stack, struct.pack("<8I", *values))
+        self.after_entry.write(stack, values[7] & ~IT_STATE, EXC_RETURN, self.vector(number))  # A handler does not begin within an IT block.
         self.spend(12)
         return True
+
+    def is_stack(self, address):
+        """There is RAM for the eight registers."""
+        return 0 <= address - 0x20000000 <= self.board.ram_size - 32
+
+    def vector(self, number):
+        """From the table that VTOR selects. Address 0 shows the image, or the boot loader that has started it."""
+        self.expect(self.vtor or not self.is_started_by_boot_loader, "an exception went to the boot loader's handler")
+        return struct.unpack_from("<I", self.image, (self.vtor or FLASH) - FLASH + 4 * number)[0]
 
     def leave_exception(self):
         (stack,) = self.stack.read()
@@ -295,8 +313,16 @@ class Machine:
         self.cpu.reg_write(PC, start | 1)
         self.cpu.reg_write(XPSR, 0x01000000)
         self.pending, self.active, self.enabled, self.sleeping, self.reset_requested = set(), None, 0, False, False
+        self.vtor = self.cfsr = 0
+        self.is_started_by_boot_loader = False
         self.look_at_pins()
         self.tick_ns, self.syst = None, {0x10: 0, 0x14: 0, 0x18: 0}
+
+    def start_by_boot_loader(self):
+        """As the chip's own one in its system memory does after "Go": its vectors stay at address 0, and it may leave interrupts masked."""
+        self.reset("boot loader", PINRSTF)
+        self.is_started_by_boot_loader = True
+        self.cpu.reg_write(PRIMASK, 1)
 
     def reset(self, cause, flag):
         """RAM retains its contents; everything else restarts."""
@@ -368,9 +394,9 @@ class Machine:
         if status != UC_ERR_OK:
             raise UcError(status)
 
-    def lose_power(self):
-        """From the next instruction on; then it comes back."""
-        self.power_lost = True
+    def lose_power(self, ram_survives=False):
+        """From the next instruction on; then it comes back. In a short brown-out RAM often survives."""
+        self.power_lost, self.ram_survives = True, ram_survives
         self.clock.is_asked_to_stop = 1
         self.touch()
 
@@ -389,8 +415,10 @@ class Machine:
         self.count_tick()
         if offset == 0x18 and self.tick_ns is not None:
             return min((self.tick_ns - self.now_ns) * self.clocks.core_hz // 10**9, self.syst[0x14])
-        if offset == 0xD04:  # ICSR: PENDSTSET.
-            return (SYSTICK in self.pending) << 26
+        if offset == 0xD04:  # ICSR: PENDSTSET, VECTACTIVE.
+            return (SYSTICK in self.pending) << 26 | (self.active or 0)
+        if offset == 0xD28:
+            return self.cfsr
         self.expect(offset in self.syst, f"0x{0xE000E000 + offset:08X} was read, which is not modelled")
         return self.syst.get(offset, 0)
 
@@ -403,6 +431,9 @@ class Machine:
             self.tick_ns = self.now_ns + self.tick_span_ns() if self.syst[0x10] & 1 else None
         elif offset in (0x100, 0x104):
             self.enabled |= value << 8 * (offset - 0x100)
+        elif offset == 0xD08:
+            self.expect(not value & 0xFF, "VTOR is not aligned to the size of the table")
+            self.vtor = value
         elif offset == 0xD0C:
             self.reset_requested = value >> 16 == 0x05FA and bool(value & 4)
         else:

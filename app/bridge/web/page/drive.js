@@ -2,7 +2,7 @@
 "use strict";
 // The pad: it drives only while a hand holds it.
 
-// No release comes from a mouse or keyboard whose link died: each report of it is evidence of a hand, and driving needs a fresh one.
+// A mouse or keyboard whose link has failed reports no release. So each report counts as a sign of a hand, and driving needs a fresh one.
 const HAND_WARN_MS = 1000, HAND_STOP_MS = 2000, DRIVE_MS = 100, YAW_MRAD_S = 800, KEY_SHARE = 0.6;
 const KEYS = { ArrowUp: [0, -1], ArrowDown: [0, 1], ArrowLeft: [-1, 0], ArrowRight: [1, 0] };
 const drive = { on: false, held: false, key: "", sequence: 0, v: 0, yaw: 0, session: 0, hand_ms: 0, pointer: null, keys: new Set() };
@@ -27,7 +27,7 @@ function put(id, v, yaw) {
   $(id).style.top = `${50 - clamp(v / page.rights.max_speed_mm_s) * 50}%`;
 }
 
-// What is measured, as far as both wheels and their track are known.
+// The measured motion; null unless both wheels and their track are known.
 function measuredMotion(state) {
   const left = state?.left.speed_mm_s ?? null, right = state?.right.speed_mm_s ?? null, track = parseFloat(state?.ledger.track?.value);
   return left === null || right === null || !(track > 0) ? null : [(left + right) / 2, ((right - left) * 1000) / track];
@@ -65,7 +65,7 @@ async function hold(x, y) {
   if (drive.held) return;
   drive.held = true;
   $("pad").classList.add("held");
-  const session = ++drive.session, since = page.t_us; // Since when the hand is there, by the machine's own clock.
+  const session = ++drive.session, since = page.t_us; // Begin of the hold, by the machine's own clock.
   try {
     const query = new URLSearchParams({ boot: await bootOf(), t_us: since });
     const answer = await ask("POST", `/api/arm?${query}`, { signal: AbortSignal.timeout(ASK_MS) });
@@ -80,7 +80,7 @@ async function hold(x, y) {
   }
 }
 
-// One command at a time, each quoting the newest time heard: what is late is dropped by the bridge, never carried out.
+// One command at a time. Each quotes the newest received time: the bridge drops a late one.
 async function feed(session) {
   while (drive.held && session === drive.session) {
     const begun = performance.now(), still_ms = begun - drive.hand_ms;
@@ -155,7 +155,7 @@ function setUpDriving() {
     pad.focus();
     hold(...from(event));
   });
-  // A second finger, wherever it is, is no steering: a pinch, a palm, or somebody else's hand.
+  // A second finger anywhere does not steer: it is a pinch, a palm, or the hand of another person.
   document.addEventListener("pointerdown", (event) => {
     if (!drive.held || event.pointerId === drive.pointer) return;
     letGo("why_second");

@@ -89,7 +89,7 @@ function takeEvent(event) {
   }
 }
 
-// What changes in the machine is marked in the plots.
+// Marks changes of the machine in the plots.
 function markChange(before, state) {
   if (!before || before.state === state.state) return;
   const cause = state.cause !== before.cause ? state.cause : null;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 "use strict";
-// The page as a whole: its parts are set up, and painted.
+// Sets up the parts of the page, and paints them.
 
 const plots = {};
 let path;
@@ -33,8 +33,9 @@ function setUp() {
   setUpLanguage($("language"));
   choose($("units"), Object.keys(UNITS).map((one) => [one, one]), unit, (one) => { unit = one; localStorage.setItem("units", one); show(); });
   $("forget").addEventListener("click", () => { setToken(""); askToken(); });
-  $("last-stop").addEventListener("click", () => { document.querySelector("#stops details")?.setAttribute("open", ""); });
+  $("last-stop").addEventListener("click", () => { document.querySelector("#stops [aria-expanded='false']")?.click(); });
   $("freeze").addEventListener("click", freeze);
+  $("record").addEventListener("click", switchRecord);
   $("live").addEventListener("click", goLive);
   $("forces").addEventListener("click", showAllForces);
   for (const one of $("spans").children) one.addEventListener("click", () => showSpan(Number(one.dataset.seconds)));
@@ -58,7 +59,7 @@ function setUp() {
   listen();
   setInterval(show, 200);
   const paint = () => {
-    // Ten minutes are many points, and nobody sees a fiftieth of a second in them.
+    // Ten minutes are many points: no person sees a fiftieth of a second in them.
     if (performance.now() - paint.last >= (view.span_s > 60 ? 500 : 50) || view.plots.some((plot) => plot.forced)) {
       paint.last = performance.now();
       view.plots.forEach((plot) => plot.draw());

@@ -13,59 +13,95 @@ async function loadStops() {
   page.stop = newest?.number ?? null;
   page.newest = newest;
   $("last-stop").textContent = newest ? fill(STRINGS.last_stop, { when: clock(newest.wall_us), cause: causeInWords(newest) }) : STRINGS.no_stops;
-  const open = new Set([...document.querySelectorAll("#stops details[open]")].map((one) => one.dataset.number));
-  $("stops").replaceChildren(...(stops.length ? stops.map((stop) => showStop(stop, open.has(String(stop.number)))) : [element("p", { text: STRINGS.no_stops, class: "quiet" })]));
+  const open = new Set([...document.querySelectorAll("#stops [aria-expanded='true']")].map((one) => one.dataset.number));
+  $("stops").replaceChildren(...(stops.length ? stops.map((stop) => stopCard(stop, open.has(String(stop.number)))) : [element("li", { text: STRINGS.no_stops, class: "quiet" })]));
 }
 
-// "e-stop pressed", "wheel offline (left)": a sentence with all figures stands in the list.
+// "e-stop pressed", "wheel offline (left)": the list has the sentence with all figures.
 function causeInWords({ cause, side }) {
   const words = STRINGS.causes[cause] ?? cause;
   return side ? `${words} (${STRINGS.sides[side] ?? side})` : words;
 }
 
-function showStop(stop, isOpen) {
-  const details = element("details", { "data-number": stop.number }, element("summary", { text: fill(STRINGS.stop_at, { when: when(stop.wall_us), sentence: stop.sentence }) }));
-  details.addEventListener("toggle", () => {
-    if (!details.open || details.children.length > 1) return;
-    const [svg, frames] = drawFrames(stop), table = element("table");
-    rows(table, [STRINGS.frame_time, STRINGS.frame_id, STRINGS.frame_data, STRINGS.frame_kind], frames.map((frame) => [frame.ms.toFixed(1), `${frame.id} ${IDS[frame.id] ?? ""}`, frame.data, frame.kind]));
-    if (stop.recording) details.append(element("p", { text: fill(STRINGS.stop_recording, { name: stop.recording.split("/").pop() }) }));
-    details.append(element("div", { class: "scroll", tabindex: "0", role: "group", "aria-label": STRINGS.frames_label }, svg, table));
-  });
-  details.open = isOpen;
-  return details;
+function button(text, label, action, more = {}) {
+  const made = element("button", { type: "button", text, "aria-label": label, ...more });
+  made.addEventListener("click", action);
+  return made;
+}
+
+// Cause, time and sentence of a stop, its frames on request, and its recording in the plots.
+function stopCard(stop, isOpen) {
+  const frames = element("div", { class: "scroll", tabindex: "0", role: "group", "aria-label": STRINGS.frames_label, hidden: "" });
+  const title = capital(causeInWords(stop)), name = stop.recording?.split("/").pop().replace(/\.log$/, "");
+  const toggle = button(STRINGS.stop_frames, say("stop_frames_of", { what: title }), () => {
+    if (!frames.children.length) frames.append(...stopFrames(stop));
+    frames.hidden = !frames.hidden;
+    toggle.setAttribute("aria-expanded", String(!frames.hidden));
+  }, { "aria-expanded": "false", "data-number": stop.number });
+  const opens = name ? [button(STRINGS.stop_open, say("recording_open_of", { name }), () => openRecording(name, ["log", "jsonl", "conf"]))] : [];
+  if (isOpen) toggle.click();
+  return element("li", {}, element("h3", { text: title }), element("p", { class: "quiet", text: when(stop.wall_us) }), element("p", { text: stop.sentence }),
+    element("div", { class: "row" }, toggle, ...opens), frames);
+}
+
+function stopFrames(stop) {
+  const [svg, frames] = drawFrames(stop), table = element("table");
+  rows(table, [STRINGS.frame_time, STRINGS.frame_id, STRINGS.frame_data, STRINGS.frame_kind], frames.map((frame) => [frame.ms.toFixed(1), `${frame.id} ${IDS[frame.id] ?? ""}`, frame.data, frame.kind]));
+  return [svg, table];
 }
 
 async function loadRecordings() {
-  let found;
+  let found, running;
   try {
-    ({ recordings: found } = await askJson("/api/recordings"));
+    ({ recordings: found, on_request: running } = await askJson("/api/recordings"));
   } catch (error) {
     $("recordings-says").textContent = fill(STRINGS.recordings_unknown, { why: error.message });
     return;
   }
   $("recordings-says").textContent = found.length ? "" : STRINGS.recordings_none;
   $("recordings").replaceChildren(...[...found].reverse().map(recordingCard));
+  if (running) showRecord(running, found.find((one) => one.name === running.name)); // A gateway of an earlier version has none.
 }
 
-// What it is, when it was made, and a button for each thing that can be done with it.
+// The recording on request, on the gateway's disk.
+function showRecord(running, file) {
+  const { on, ended, fault, most_ms, most_bytes } = running, limits = { min: most_ms / 60000, MB: Math.floor(most_bytes / 1e6) };
+  const ends = { time: say("record_time", limits), size: say("record_size", limits), fault: say("record_fault", { why: fault }) };
+  const says = on ? say("record_runs", { ...limits, kB: file?.log_bytes ? Math.round(file.log_bytes / 1000) : 0 }) : ends[ended] ?? "";
+  $("record").hidden = false;
+  $("record").dataset.on = on ? "yes" : "";
+  $("record").textContent = on ? STRINGS.record_end : STRINGS.record_begin;
+  if ($("record-says").textContent !== says) $("record-says").textContent = says;
+  $("record-says").className = on || ended === "fault" ? "care" : "quiet";
+  clearTimeout(showRecord.timer);
+  if (on) showRecord.timer = setTimeout(loadRecordings, 2000);
+}
+
+async function switchRecord() {
+  try {
+    const answer = await ask("POST", `/api/record?on=${$("record").dataset.on !== "yes"}`, { signal: AbortSignal.timeout(ASK_MS) });
+    const body = await answer.json();
+    if (!answer.ok) throw new Error(body.message);
+    showRecord(body);
+    showRecord.timer = setTimeout(loadRecordings, 500); // The files then exist, or are complete.
+  } catch (error) {
+    $("record-says").textContent = fill(STRINGS.refused, { why: error.message });
+  }
+}
+
+// A recording: its cause, its time, and a button for each action.
 function recordingCard(one) {
   const there = ["log", "jsonl", "conf"].filter((ending) => one[`${ending}_bytes`] !== null);
-  const button = (text, label, action, kind = "") => {
-    const made = element("button", { type: "button", text, "aria-label": label, ...(kind ? { "data-ending": kind } : {}) });
-    made.addEventListener("click", action);
-    return made;
-  };
   const saved = (name) => fill(STRINGS.recording_save_of, { name });
   const saves = there.map((ending) => {
     const name = `${one.name}.${ending}`;
     const text = ending === "log" ? STRINGS.log_recording : `.${ending}`;
-    return button(text, `${text}: ${saved(name)}`, async () => { const blob = await load(name); if (blob) save(blob, name); }, ending);
+    return button(text, `${text}: ${saved(name)}`, async () => { const blob = await load(name); if (blob) save(blob, name); }, { "data-ending": ending });
   });
   const csv = button(STRINGS.csv_recording, saved(`${one.name}.csv`), async () => {
     const recording = decodeRecording(await loadAll(one.name, there));
     if (recording) save(new Blob([recordingCsv(recording)], { type: "text/csv" }), `${one.name}.csv`);
-  }, "csv");
+  }, { "data-ending": "csv" });
   const size = one.log_bytes === null ? STRINGS.unknown : `${(one.log_bytes / 1000).toFixed(0)} kB`, cause = STRINGS.recording_causes[one.cause] ?? causeInWords({ cause: one.cause });
   return element("li", {}, element("h3", { text: capital(cause) }), element("p", { class: "quiet", text: fill(STRINGS.recording_facts, { when: when(one.wall_us), size, name: one.name }) }),
     element("div", { class: "row" }, button(STRINGS.recording_open, fill(STRINGS.recording_open_of, one), () => openRecording(one.name, there)), ...saves, csv));
@@ -82,7 +118,7 @@ async function load(name) {
   }
 }
 
-// Its files as texts; what cannot be read is left out, and said.
+// Its files as texts. A file that cannot be read is left out and reported.
 async function loadAll(name, endings) {
   const files = {};
   for (const ending of endings) {
@@ -123,7 +159,7 @@ function showRecording(name, files) {
   $("source").textContent = fill(STRINGS.recording_shown, { name });
   $("happened").replaceChildren(...recording.happened.slice(-40).map((one) => element("li", { text: `${one.t.toFixed(3)} s: ${one.text}` })));
   $("player").hidden = false;
-  document.body.classList.add("recorded"); // The figures of now are not shown under its headings.
+  document.body.classList.add("recorded"); // No live figure is shown under its headings.
   goTo(0);
   $("tools").scrollIntoView();
 }
@@ -166,7 +202,7 @@ function goLive() {
   for (const plot of view.plots) plot.show(null);
 }
 
-// How much of the time up to now is shown.
+// The shown time up to now.
 function showSpan(seconds) {
   view.span_s = seconds;
   for (const one of $("spans").children) one.setAttribute("aria-pressed", String(Number(one.dataset.seconds) === seconds));

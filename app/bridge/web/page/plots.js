@@ -2,7 +2,7 @@
 "use strict";
 // Series over time by uPlot: they follow the newest seconds, can be moved, zoomed and frozen together, and saved as PNG and CSV.
 
-const KEPT_S = 600; // What can still be looked at by moving back; memory stays the same for hours.
+const KEPT_S = 600; // Time that is stored. The memory is constant for hours.
 
 function colour(name) {
   return getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
@@ -56,7 +56,7 @@ class Series {
   }
 }
 
-// What all plots have in common: the part of time that they show, and what happened in it. `range` is set once somebody has moved or zoomed.
+// Common to all plots: the shown time and its events. `range` is set after a move or zoom.
 const view = { range: null, span_s: 60, frozen: false, at: null, live_marks: [], marks: null, plots: [], newest_s: 0 };
 
 function redrawAll() {
@@ -216,7 +216,7 @@ class Plot {
   indexAt(t) {
     return this.uplot.data[0].findLastIndex((time) => time <= t);
   }
-  // What happened, as upright lines; of those that are close together the first has its words.
+  // Events as vertical lines. Of lines close together only the first has its text.
   drawMarks(u) {
     const { ctx } = u, { left, top, width, height } = u.bbox, ratio = devicePixelRatio;
     const marks = this.series === this.live ? view.live_marks : view.marks ?? [];

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
 "use strict";
-// Proves to the bridge that this page has the token. The token is never sent: another program may hold the port for a moment.
+// Proves to the bridge that this page has the token. The page never sends the token: another program may hold the port for a moment.
 
 const proof = { token: "", key: null, session: null };
 
-// Behind the # of the address, which no browser sends; kept in this browser until somebody forgets it here, or another one is made on the machine.
+// The token is behind the # of the address, which no browser sends. The browser stores it until a person removes it, or the machine has another one.
 function takeToken() {
   const found = /[#&]token=([0-9a-f]{32})\b/.exec(location.hash);
   if (found) {
@@ -38,7 +38,7 @@ async function authorization(method, target, signal) {
   return `IWheel ${session.id} ${session.nonce} ${sequence} ${hex(await crypto.subtle.sign("HMAC", proof.key, text))}`;
 }
 
-// The run of the bridge that an arm or a reset is for.
+// The run of the bridge that an arm or a reset quotes.
 async function bootOf() {
   proof.session ??= beginSession().catch((error) => { proof.session = null; throw error; });
   return (await proof.session).boot;

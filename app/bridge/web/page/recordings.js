@@ -15,7 +15,7 @@ function crc32(bytes, before = 0) {
   return ~crc >>> 0;
 }
 
-// The whole file as bytes; `ask(path)` gives the JSON of a request to the bridge.
+// The whole file as bytes. `ask(path)` returns the JSON of a request to the bridge.
 async function readRecording(ask, name, progress) {
   const pieces = [];
   let offset = 0, crc = 0;
@@ -68,13 +68,13 @@ function signed16(data, at) {
   return value >= 0x8000 ? value - 0x10000 : value;
 }
 
-// Series in seconds from the stop, and what the .jsonl tells. NULL without frames.
+// Series in seconds from the stop, and the events of the .jsonl. null without frames.
 function decodeRecording(files) {
   const frames = parseLog(files.log ?? ""), conf = parseConf(files.conf ?? "");
   const told = (files.jsonl ?? "").split("\n").flatMap((line) => { try { return [JSON.parse(line)]; } catch { return []; } });
   const head = told.find((one) => one.type === "blackbox"), why = told.find((one) => one.type === "why");
   if (!frames.length) return null;
-  // The log may have wall time, as candump's; the black box tells how far the two clocks are apart.
+  // The log may have wall time, as candump's. The black box contains the difference of the two clocks.
   const wall = frames[0].t_us > 1e15 ? head?.wall_minus_monotonic_us ?? 0 : 0;
   const stop_us = (why?.at_us ?? frames.at(-1).t_us - wall) + wall;
   const per_rpm = (2 * Math.PI * conf.radius_mm) / 60 / (conf.rotor ? conf.gear : 1);
@@ -112,7 +112,7 @@ function recordingCsv({ wheels }) {
   return ["t_s,wheel,requested_mm_s,commanded_mm_s,measured_mm_s,force_raw_N", ...lines.map(([t, ...rest]) => [t.toFixed(6), ...rest].join(","))].join("\n") + "\n";
 }
 
-// What the client wants from here on: its last command, while it may.
+// The command of the client from here on, while it may drive.
 function take(wheels, one) {
   if (one.type === "drive" && one.refused === null) [wheels[0].wanted, wheels[1].wanted] = [one.left_mm_s, one.right_mm_s];
   if (one.type === "state" && one.state !== "armed") wheels[0].wanted = wheels[1].wanted = null;

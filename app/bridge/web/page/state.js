@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 "use strict";
-// What is known of the machine, in words and figures.
+// Shows the state of the machine in words and figures.
 
 function cureOf(state, cause) {
   const heard = state.left.heard && state.right.heard;
@@ -76,7 +76,7 @@ const toneOf = (state) => ({ latched: "bad", stopping: "care", stopped: "care", 
 
 const capital = (words) => words.charAt(0).toUpperCase() + words.slice(1);
 
-// The state in one word, its tone, and one sentence: what to do now.
+// The state in one word, its tone, and one sentence with the next action.
 function inOneWord(state) {
   const { word, here, next } = STRINGS, lines = advise(state), first = lines[0];
   if (state.state === "latched") {
@@ -126,7 +126,7 @@ function showNow(state) {
   $("more-says").classList.toggle("care", many > 0);
 }
 
-// Of a real button: when it was last seen to work.
+// A real button: the last time at which it worked.
 function tried(estop) {
   if (estop.simulated || estop.state === "none") return "";
   return fill(STRINGS.tried_says, { when: estop.tried_wall_us ? new Date(estop.tried_wall_us / 1000).toLocaleString() : STRINGS.never });

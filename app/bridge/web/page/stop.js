@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
 "use strict";
-// STOP, the control that latches, reset, and the question before what cannot be taken back.
+// STOP, the control that latches, reset, and the question before an action that cannot be undone.
 
 const STOP_TRY_MS = 400;
 
-// Asks once, in words, before something that cannot be taken back.
+// Asks once before an action that cannot be undone.
 // Not modal: a modal dialog would make STOP inert. STOP answers it with no.
 function confirmed(text, yes) {
   const dialog = $("ask"), before = document.activeElement;
@@ -20,7 +20,7 @@ function confirmed(text, yes) {
   });
 }
 
-// Repeated until the gateway answers. Says loudly, and goes on saying, that it did not. The second control takes the place of a stop that is
+// Repeats the request until the gateway answers, and shows NOT DELIVERED until then. The second control replaces a stop that is
 // not delivered yet, never the other way round.
 async function deliver(name) {
   deliver.verb = deliver.busy && deliver.verb === "estop" ? "estop" : name;
@@ -53,7 +53,7 @@ async function deliver(name) {
   deliver.busy = false;
 }
 
-// What was said of a stop goes with the next state.
+// The result of a stop disappears with the next state.
 function forgetDelivered(state) {
   const said = page.delivered;
   if (!said) return;
@@ -77,9 +77,9 @@ function keepStopInSight() {
   bar.style.transform = `translate(${x - place.left}px, ${y - place.top}px) scale(${factor})`;
 }
 
-// What is below or beside the bar can be scrolled out of it.
+// Content below or next to the bar can be scrolled into view.
 function makeRoomForStop() {
-  const bar = $("bar"), column = bar.offsetWidth < innerWidth;
+  const bar = $("bar"), column = bar.offsetWidth < document.documentElement.clientWidth; // innerWidth has the scrollbar, too.
   document.documentElement.style.setProperty("--bar-b", column ? "0px" : `${bar.offsetHeight}px`);
   document.documentElement.style.setProperty("--bar-r", column ? `${bar.offsetWidth}px` : "0px");
   keepStopInSight();

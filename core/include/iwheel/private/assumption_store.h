@@ -12,6 +12,10 @@
 
 #include "iwheel/types.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /// State of all assumptions.
 typedef struct {
     iw_assumption_entry_t entry[IW_ASSUMPTION_ITEMS]; ///< Entries, indexed by iw_assumption_item_t.
@@ -43,4 +47,7 @@ bool iw_assumption_guards_motion(iw_assumption_item_t item);
 /// Returns the present entry of an item.
 const iw_assumption_entry_t *iw_assumption_entry(const iw_assumption_store_t *self, iw_assumption_item_t item);
 
+#ifdef __cplusplus
+}
+#endif
 #endif

@@ -14,6 +14,10 @@
 
 #include "iwheel/config.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /// A limit falls by 1 mA in this time: 4000 mA/s.
 #define IW_CURRENT_FALL_US 250U
 
@@ -30,4 +34,7 @@ bool iw_current_limit(const iw_config_t *config, int32_t limit_mA[IW_SIDES], boo
 /// IW_CURRENT_FALL_US.
 void iw_current_follow(int16_t limit_mA[IW_SIDES], const iw_pair_t *target, uint32_t elapsed_us);
 
+#ifdef __cplusplus
+}
+#endif
 #endif

@@ -9,6 +9,10 @@
 
 #include "iwheel/config.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /// Duration of opposite signs that counts. Safety rule.
 #define IW_FOLLOW_SIGN_US 300000U
 /// A wheel is blocked below this share of its command ...
@@ -47,4 +51,7 @@ iw_follow_verdict_t iw_follow_step(iw_follow_t *self, iw_time_us_t now_us, int32
 /// Returns true if command and measurement have had equal signs, both above IW_SIGN_MM_S, for IW_FOLLOW_SIGN_US.
 bool iw_follow_sign_confirmed(const iw_follow_t *self, iw_time_us_t now_us);
 
+#ifdef __cplusplus
+}
+#endif
 #endif

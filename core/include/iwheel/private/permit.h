@@ -39,6 +39,10 @@
 
 #include "iwheel/config.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /// A cause that is an event counts as gone after this time without a new one.
 #define IW_PERMIT_EVENT_US 1000000U
 /// The core sends zeros until both wheels were at standstill for this time ...
@@ -194,4 +198,7 @@ bool iw_permit_ending(const iw_permit_t *self, iw_time_us_t now_us);
 /// Returns the time at which `iw_permit_step` must run even if nothing happens; IW_NEVER if there is none.
 iw_time_us_t iw_permit_next_us(const iw_permit_t *self);
 
+#ifdef __cplusplus
+}
+#endif
 #endif

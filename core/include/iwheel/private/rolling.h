@@ -15,6 +15,10 @@
 
 #include "iwheel/types.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /// A wheel that is faster than this turns. Safety rule.
 #define IW_ROLLING_MM_S 100
 /// Duration of turning, or of not turning, that changes the state. Safety rule.
@@ -37,4 +41,7 @@ void iw_rolling_init(iw_rolling_t *self);
 /// Advances the state. `turns`: nothing is sent and a wheel is faster than IW_ROLLING_MM_S.
 void iw_rolling_step(iw_rolling_t *self, iw_time_us_t now_us, bool turns);
 
+#ifdef __cplusplus
+}
+#endif
 #endif

@@ -24,6 +24,10 @@
 #include "iwheel/config.h"
 #include "iwheel/private/yaw.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /// Shortest interval between the last pair and the pair of a new command.
 #define IW_SETPOINT_SPACING_US 5000U
 
@@ -80,4 +84,7 @@ static inline iw_time_us_t iw_setpoint_next_us(const iw_setpoint_t *self) {
     return self->due_us;
 }
 
+#ifdef __cplusplus
+}
+#endif
 #endif

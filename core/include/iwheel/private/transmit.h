@@ -13,6 +13,10 @@
 #include "iwheel/config.h"
 #include "iwheel/hal.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 // ---- Envelope ----
 //
 // The envelope is the last check (R8) of every outgoing frame, directly before the port receives it. It does not know
@@ -143,4 +147,7 @@ void iw_sender_rest(iw_sender_t *self);
 /// Calls `purge` of the port and returns its result: see hal.h. If the port has purged (> 0), no frame is unconfirmed.
 int iw_sender_purge(iw_sender_t *self);
 
+#ifdef __cplusplus
+}
+#endif
 #endif

@@ -19,6 +19,10 @@
 #include "iwheel/codec.h"
 #include "iwheel/config.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /// After this time without a frame the core assumes that the wheel had no power.
 #define IW_WHEEL_REBOOT_SILENCE_US 1000000U
 /// Period of offset messages (document).
@@ -101,4 +105,7 @@ static inline iw_reboot_t iw_wheel_next_reboot(iw_wheel_t *self) {
     return reboot;
 }
 
+#ifdef __cplusplus
+}
+#endif
 #endif

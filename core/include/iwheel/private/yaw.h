@@ -15,6 +15,10 @@
 
 #include "iwheel/types.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /// Checked configuration of the machine. With the ranges of iw_config_t every product fits 32 bits.
 typedef struct {
     uint32_t max_yaw_mrad_s;    ///< Largest yaw rate of the real machine.
@@ -44,4 +48,7 @@ int32_t iw_yaw_bound(const iw_yaw_t *self, int32_t from_um_s, uint32_t growth_um
 /// limit: the result is then smaller than the change.
 uint32_t iw_yaw_margin(int32_t bound_um_s, int32_t from_um_s, int32_t change_um_s);
 
+#ifdef __cplusplus
+}
+#endif
 #endif

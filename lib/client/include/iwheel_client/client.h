@@ -200,7 +200,10 @@ IWC_API bool iwc_reply(const iwc_t *self, iwc_message_t *out_reply);
 
 /// Returns the name of the last refusal; empty: none.
 IWC_API const char *iwc_error(const iwc_t *self);
-/// Returns the message of the last refusal: cause and fix.
+/// Returns why the last call that failed did so: the gateway's message of a refusal (cause and fix), otherwise the text
+/// of `iwc_words`. One line, never empty: before the first connection the text of IWC_CLOSED, and after a connection on
+/// which no call has failed that of IWC_OK. `self` may be NULL (iwc_new found no memory). A call that succeeds changes nothing, and no message within the timeout of
+/// `iwc_next` is not a failure. Valid until the next call with the same handle.
 IWC_API const char *iwc_reason(const iwc_t *self);
 
 // ---- reading ------------------------------------------------------------------------------------------------------

@@ -16,12 +16,7 @@ static bool contradicted(const iw_snapshot_t *seen, iw_assumption_item_t item) {
     return seen->assumed[item].state == IW_CONTRADICTED;
 }
 
-/// Returns true if speeds in mm/s and distances are valid: they depend on radius and gear ratio.
-static bool is_speed_known(const iw_snapshot_t *seen) {
-    return !contradicted(seen, IW_ASSUMPTION_WHEEL_RADIUS) &&
-           !(seen->config->rpm_of_rotor && contradicted(seen, IW_ASSUMPTION_GEAR_RATIO));
-}
-
+/// Returns true if distances are valid: they depend on radius and gear ratio.
 static bool is_distance_known(const iw_snapshot_t *seen) {
     return !contradicted(seen, IW_ASSUMPTION_WHEEL_RADIUS) && !contradicted(seen, IW_ASSUMPTION_GEAR_RATIO);
 }
@@ -40,13 +35,19 @@ static void write_motion(const iw_snapshot_t *seen, iw_side_t side, iwn_out_t *j
         iwn_out_null(json, "at_rest");
     }
     iwn_out_known32(json, "speed_rpm", online, wheel->told->speed.speed_rpm);
-    iwn_out_known32(json, "speed_mm_s", online && is_speed_known(seen), wheel->speed_mm_s);
+    iwn_out_known32(json, "speed_mm_s", online && iwn_is_speed_known(seen), wheel->speed_mm_s);
     iwn_out_known32(json, "acceleration_raw", online, wheel->told->speed.acceleration_raw);
     iwn_out_known32(json, "commanded_mm_s", following, wanted.speed_mm_s);
     iwn_out_known32(json, "commanded_mA", following, wanted.current_mA);
     iwn_out_known32(json, "applied_mm_s", sending, applied.speed_mm_s);
     iwn_out_known32(json, "applied_mA", sending, applied.current_mA);
     iwn_write_age("speed_age_ms", seen->at_us, wheel->speed_us, json);
+}
+
+/// A controller has no instruction for this division, and its library's for signed numbers is large.
+static int64_t mm_of_nm(int64_t nm) {
+    const uint64_t mm = ((nm < 0) ? 0U - (uint64_t)nm : (uint64_t)nm) / 1000000U;
+    return (nm < 0) ? -(int64_t)mm : (int64_t)mm;
 }
 
 static void write_condition(const iw_snapshot_t *seen, iw_side_t side, iwn_out_t *json) {
@@ -61,7 +62,7 @@ static void write_condition(const iw_snapshot_t *seen, iw_side_t side, iwn_out_t
     iwn_out_known32(json, "temperature_degC", warm, status->temperature_degC);
     iwn_out_known32(json, "cpu_percent", cpu, status->cpu_percent);
     iwn_out_known(json, "ticks", ever, wheel->ticks);
-    iwn_out_known(json, "distance_mm", ever && is_distance_known(seen), wheel->ticks * wheel->nm_per_tick / 1000000);
+    iwn_out_known(json, "distance_mm", ever && is_distance_known(seen), mm_of_nm(wheel->ticks * wheel->nm_per_tick));
     iwn_write_age("status_age_ms", seen->at_us, wheel->status_us, json);
     iwn_out_int(json, "reboots", wheel->reboots);
     iwn_out_open(json, "valid", '{');

@@ -21,7 +21,8 @@ static int64_t age_ms(iw_time_us_t now_us, int64_t wall_us, const iw_force_t *fo
     if (force->offset_us != IW_NEVER) {
         return (int64_t)((now_us - force->offset_us) / IW_US_PER_MS);
     }
-    return (noted->wall_us > 0 && noted->wall_us <= wall_us) ? (wall_us - noted->wall_us) / 1000 : -1;
+    const bool known = noted->wall_us > 0 && noted->wall_us <= wall_us;
+    return known ? (int64_t)((uint64_t)(wall_us - noted->wall_us) / IW_US_PER_MS) : -1;
 }
 
 static zero_t describe_zero(const iw_snapshot_t *seen, const iwn_surroundings_t *around, iw_side_t side) {

@@ -6,8 +6,6 @@
 #include <string.h>
 
 #define CRC_DIGITS 8U
-/// Largest number of digits of a stamp: 20 digits hold every 64-bit number.
-#define STAMP_DIGITS 20U
 
 const char *iwn_line_verdict_name(iwn_line_verdict_t verdict) {
     static const char *const names[IWN_LINE_VERDICTS] = {
@@ -46,20 +44,6 @@ static unsigned hex_value(char c) {
     return (c >= 'a' && c <= 'f') ? (unsigned)(c - 'a') + 10U : 16U;
 }
 
-/// Writes decimal digits. Returns their number.
-static size_t write_number(uint64_t number, char out[STAMP_DIGITS]) {
-    char reversed[STAMP_DIGITS];
-    size_t digits = 0;
-    do {
-        reversed[digits++] = (char)('0' + (char)(number % 10U));
-        number /= 10U;
-    } while (number > 0U);
-    for (size_t i = 0; i < digits; i++) {
-        out[i] = reversed[digits - 1U - i];
-    }
-    return digits;
-}
-
 /// Returns the number of bytes of a number in its only valid form; 0 if there is none, or it exceeds 64 bits.
 static size_t read_number(const char *text, size_t length, uint64_t *out_number) {
     size_t digits = 0;
@@ -77,22 +61,22 @@ static size_t read_number(const char *text, size_t length, uint64_t *out_number)
 }
 
 size_t iwn_line_begin(const iwn_line_t *line, char *out, size_t size) {
-    char prefix[IWN_LINE_PREFIX];
-    size_t length = 0;
+    char bytes[IWN_LINE_PREFIX + 1U];
+    iwn_text_t prefix = iwn_text_begin(bytes, sizeof bytes);
     if (line->channel > IWN_LINE_CHANNELS) {
         return 0;
     }
-    prefix[length++] = (char)('0' + (char)line->channel);
-    prefix[length++] = ' ';
+    iwn_text_unsigned(&prefix, line->channel);
+    iwn_text_add(&prefix, " ");
     if (line->stamped) {
-        length += write_number(line->t_us, &prefix[length]);
-        prefix[length++] = ' ';
+        iwn_text_unsigned(&prefix, line->t_us);
+        iwn_text_add(&prefix, " ");
     }
-    if (length > size) {
+    if (prefix.length > size) {
         return 0;
     }
-    memcpy(out, prefix, length);
-    return length;
+    memcpy(out, bytes, prefix.length);
+    return prefix.length;
 }
 
 size_t iwn_line_end(char *out, size_t length, size_t size) {
@@ -203,15 +187,14 @@ void iwn_receiver_spoil(iwn_receiver_t *self) {
 }
 
 size_t iwn_quote_write(const iwn_quote_t *quote, const char *json, size_t length, char *out, size_t size) {
-    char digits[STAMP_DIGITS];
     if (length < 2U || size < IWN_QUOTE_SIZE || length > size - IWN_QUOTE_SIZE) {
         return 0;
     }
     iwn_text_t text = iwn_text_begin(out, size);
     IWN_TEXT_JOIN(&text, "{\"boot\":\"", quote->boot, "\",\"seq\":");
-    iwn_text_span(&text, digits, write_number(quote->seq, digits));
+    iwn_text_unsigned(&text, quote->seq);
     iwn_text_add(&text, ",\"t_us\":");
-    iwn_text_span(&text, digits, write_number(quote->t_us, digits));
+    iwn_text_unsigned(&text, quote->t_us);
     iwn_text_add(&text, ",");
     iwn_text_span(&text, &json[1], length - 1U);
     return text.length;

@@ -65,9 +65,9 @@ static void say_not_armed(wording_t *self) {
 
 static void say_estop(wording_t *self) {
     SAY(self, "the e-stop ", self->context->estop,
-        (self->context->estop_answer < 0)
-            ? " cannot be read, which counts as pressed; check its wire, then: iwheelctl reset"
-            : " is pressed; release the button, then: iwheelctl reset");
+        (self->context->estop_answer < 0) ? " cannot be read, which counts as pressed; check its wire"
+                                          : " is pressed; release the button",
+        iwn_why_then(IW_CAUSE_ESTOP_LINE));
 }
 
 static void say_lost(wording_t *self) {
@@ -279,7 +279,7 @@ bool iwn_refuse_late(const iwn_request_t *request, const iwn_moment_t *moment, i
     }
     if (t_us < (int64_t)moment->stopped_us) {
         return refuse_late(out_refusal, "the wheels were stopped after t_us of this request, ",
-                           (now_us - (int64_t)moment->stopped_us) / (int64_t)IW_US_PER_MS,
+                           (int64_t)((moment->now_us - moment->stopped_us) / IW_US_PER_MS),
                            " ms ago; read why (iwheelctl why), then send it again");
     }
     return false;

@@ -44,11 +44,13 @@ IW_STATIC_ASSERT(IWN_CMDS <= 24 && FIELDS <= 32, a_bit_for_each_command_and_each
 #define NOT_PLAIN                                                                                                      \
     " without characters that move a terminal (control characters, line separators, marks of writing direction)"
 
+#define EXAMPLE ", for example {\"cmd\":\"status\"}"
+
 #define NUMBER_SIZE (IWN_DIGITS_MAX + 1U)
 
 bool iwn_cmd_watches(iwn_cmd_t cmd) {
     const unsigned watching = BIT(HELLO) | BIT(STATUS) | BIT(WATCH) | BIT(WHY) | BIT(STOP) | BIT(DISARM) | BIT(ESTOP) |
-                              BIT(RECORDINGS) | BIT(RECORDING);
+                              BIT(RECORDINGS) | BIT(RECORDING) | BIT(RECORD);
     return (watching & 1U << cmd) != 0U;
 }
 
@@ -225,7 +227,7 @@ static bool read_id(iwn_json_t value, iwn_id_t *out_id, iwn_refusal_t *out_refus
 
 static bool read_cmd(iwn_json_t value, iwn_cmd_t *out_cmd, iwn_refusal_t *out_refusal) {
     if (iwn_json_kind(value) != IWN_JSON_TEXT) {
-        return IWN_REFUSE(out_refusal, IWN_BAD_VALUE, "cmd must be a text, for example {\"cmd\":\"status\"}");
+        return IWN_REFUSE(out_refusal, IWN_BAD_VALUE, "cmd must be a text", EXAMPLE);
     }
     const unsigned cmd = find_word(value, cmd_word);
     if (cmd == IWN_CMDS) {
@@ -254,7 +256,7 @@ static bool read_common(members_t *members, iwn_request_t *request, iwn_refusal_
         return false;
     }
     if (members->cmd.at == NULL) {
-        return IWN_REFUSE(out_refusal, IWN_MISSING_FIELD, "a request needs cmd, for example {\"cmd\":\"status\"}");
+        return IWN_REFUSE(out_refusal, IWN_MISSING_FIELD, "a request needs cmd", EXAMPLE);
     }
     return read_cmd(iwn_json_value(members->cmd), &request->cmd, out_refusal);
 }

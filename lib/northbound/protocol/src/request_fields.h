@@ -21,6 +21,7 @@
     NAME(confirm)                                                                                                      \
     NAME(recordings)                                                                                                   \
     NAME(recording)                                                                                                    \
+    NAME(record)                                                                                                       \
     NAME(config)
 
 /// Name, member of iwn_request_t, kind, largest size of a text in bytes, required, requests with this field.
@@ -45,6 +46,7 @@
     ROW(how, how, TEXT, 127, false, BIT(CONFIRM))                                                                      \
     ROW(name, file, TEXT, 63, true, BIT(RECORDING))                                                                    \
     ROW(offset, offset, INTEGER, 0, false, BIT(RECORDING))                                                             \
+    ROW(on, on, FLAG, 0, true, BIT(RECORD))                                                                            \
     ROW(key, key, TEXT, 40, false, BIT(CONFIG))                                                                        \
     ROW(commit, commit, FLAG, 0, false, BIT(CONFIG))
 

@@ -194,17 +194,21 @@ size_t iwn_digits_length(int64_t number) {
     return length;
 }
 
-char *iwn_digits(int64_t number, char *end) {
-    uint64_t rest = without_sign(number);
+char *iwn_digits_unsigned(uint64_t number, char *end) {
     bool last = false;
     while (!last) {
-        last = rest <= UINT32_MAX;
-        const uint64_t high = last ? 0U : rest / 1000000000U;
-        char *const at = digits_32((uint32_t)(rest - high * 1000000000U), end);
+        last = number <= UINT32_MAX;
+        const uint64_t high = last ? 0U : number / 1000000000U;
+        char *const at = digits_32((uint32_t)(number - high * 1000000000U), end);
         end = last ? at : end - 9;
         memset(end, '0', (size_t)(at - end)); // Leading zeros of the lower nine digits.
-        rest = high;
+        number = high;
     }
+    return end;
+}
+
+char *iwn_digits(int64_t number, char *end) {
+    end = iwn_digits_unsigned(without_sign(number), end);
     if (number < 0) {
         *--end = '-';
     }
@@ -228,11 +232,18 @@ void iwn_text_add(iwn_text_t *self, const char *text) {
     iwn_text_span(self, text, strlen(text));
 }
 
-void iwn_text_int(iwn_text_t *self, int64_t number) {
+void iwn_text_unsigned(iwn_text_t *self, uint64_t number) {
     char digits[IWN_DIGITS_MAX];
     const char *const end = digits + sizeof digits;
-    const char *const begin = iwn_digits(number, digits + sizeof digits);
+    const char *const begin = iwn_digits_unsigned(number, digits + sizeof digits);
     iwn_text_span(self, begin, (size_t)(end - begin));
+}
+
+void iwn_text_int(iwn_text_t *self, int64_t number) {
+    if (number < 0) {
+        iwn_text_add(self, "-");
+    }
+    iwn_text_unsigned(self, without_sign(number));
 }
 
 void iwn_text_hex(iwn_text_t *self, uint32_t number, unsigned digits) {

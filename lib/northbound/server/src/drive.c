@@ -74,20 +74,20 @@ static void refuse_turn(iwn_server_t *self, iwn_client_t *client) {
     refuse_unjudged(self, client, &turn);
 }
 
-static int64_t limit(int64_t value) {
-    const int64_t most = 1000000; // Far outside the range, and no product of it overflows.
-    return (value > most) ? most : (value < -most) ? -most : value;
+static int32_t limit(int64_t value) {
+    const int32_t most = 1000000; // Far outside the range, and its product with the largest track has 31 bits.
+    return (value > most) ? most : (value < -most) ? -most : (int32_t)value;
 }
 
 void iwn_server_twist(iwn_server_t *self, iwn_client_t *client) {
-    const int64_t v_mm_s = limit(self->request.v_mm_s);
-    const int64_t yaw_mrad_s = limit(self->request.yaw_mrad_s);
+    const int32_t v_mm_s = limit(self->request.v_mm_s);
+    const int32_t yaw_mrad_s = limit(self->request.yaw_mrad_s);
     const iw_snapshot_t *const seen = iwn_server_look(self);
     if (yaw_mrad_s != 0 && seen->assumed[IW_ASSUMPTION_TRACK].state == IW_CONTRADICTED) {
         refuse_turn(self, client);
         return;
     }
-    const int64_t rim_mm_s = yaw_mrad_s * (int64_t)seen->config->track_mm / 2000;
-    const iw_drive_t wanted = {.speed_mm_s = {saturate(v_mm_s - rim_mm_s), saturate(v_mm_s + rim_mm_s)}};
+    const int32_t rim_mm_s = yaw_mrad_s * (int32_t)seen->config->track_mm / 2000;
+    const iw_drive_t wanted = {.speed_mm_s = {v_mm_s - rim_mm_s, v_mm_s + rim_mm_s}};
     drive(self, client, &wanted);
 }

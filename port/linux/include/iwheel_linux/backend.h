@@ -15,6 +15,10 @@
 #include "iwheel/hal.h"
 #include "iwheel_linux/bus_link.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /// Storage for the state of any backend, so that its owner need not know the size.
 typedef union {
     uint64_t align;      ///< Sets the strictest alignment that a backend needs.
@@ -108,4 +112,7 @@ extern const iwl_estop_ops_t iwl_unix_estop_ops;
 /// E-stop on a GPIO line, by its name or as `gpiochipN:OFFSET`, through libgpiod. NULL if this build has no libgpiod.
 extern const iwl_estop_ops_t *const iwl_gpio_estop_ops;
 
+#ifdef __cplusplus
+}
+#endif
 #endif

@@ -9,6 +9,10 @@
 #include "iwheel/can_frame.h"
 #include "iwheel/types.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /// Presence of the interface.
 typedef enum {
     IWL_LINK_LOCAL = 0, ///< Not an interface of the kernel. Only `echo_proven` of the fields below is valid.
@@ -78,4 +82,7 @@ static inline uint32_t iwl_bus_frame_bits(const iw_can_frame_t *frame) {
 /// Returns true if both have the same state of the interface. Purge, changes, lost, room and load are not compared.
 bool iwl_bus_link_is_same(const iwl_bus_link_t *one, const iwl_bus_link_t *other);
 
+#ifdef __cplusplus
+}
+#endif
 #endif

@@ -6,6 +6,10 @@
 
 #include "iwheel/types.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /// Returns CLOCK_MONOTONIC in microseconds. It never steps, and it stops while the machine is suspended.
 iw_time_us_t iwl_clock_now_us(void);
 
@@ -23,4 +27,7 @@ iw_time_us_t iwl_clock_read(iw_time_us_t *out_suspended_us);
 /// Returns CLOCK_REALTIME in microseconds since 1970. It may step in either direction.
 int64_t iwl_clock_wall_us(void);
 
+#ifdef __cplusplus
+}
+#endif
 #endif

@@ -8,6 +8,10 @@
 
 #include "iwheel_linux/backend.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /// An open bus and an open e-stop. Only the port may use the members.
 typedef struct {
     const iwl_estop_ops_t *estop_ops;     ///< Kind of the e-stop, the same for both contacts.
@@ -67,4 +71,7 @@ bool iwl_hal_estop_seen(const iwl_hal_t *self, unsigned contact, iwl_estop_seen_
 /// Returns the errno of the reason why a contact cannot be read; 0 while it can.
 int iwl_hal_estop_trouble(const iwl_hal_t *self, unsigned contact);
 
+#ifdef __cplusplus
+}
+#endif
 #endif

@@ -10,6 +10,9 @@
 #define BRD_NAME     "STM32F407 (Discovery)"
 #define BRD_LAMP     BRD_PIN_D(12U) ///< LD4, green (UM1472). PA5 is the clock of the motion sensor.
 #define BRD_LAMP_LIT 1              ///< Level that switches it on.
+/// Revision A does not support prefetch, and its device identifier is wrong too (ES0182), so no revision uses it: the
+/// caches of the flash do most of its work.
+#define BRD_CAN_PREFETCH 0
 
 #include "board_f4.h"
 

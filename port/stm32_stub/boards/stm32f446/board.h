@@ -12,6 +12,8 @@
 #define BRD_LAMP     BRD_PIN_A(5U) ///< LD2 (UM1724).
 #define BRD_LAMP_LIT 1             ///< Level that switches it on.
 
+#define BRD_CAN_PREFETCH 1 ///< Of the flash.
+
 #include "board_f4.h"
 
 #endif

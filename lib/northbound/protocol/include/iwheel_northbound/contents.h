@@ -13,6 +13,10 @@
 
 #include "iwheel/gateway.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /// Increases if an earlier client would misunderstand the protocol.
 #define IWN_API_VERSION 1
 /// Telemetry other than speed is unknown after this time: five periods of status and pose.
@@ -133,4 +137,14 @@ iwn_out_t iwn_write_event(char *data, size_t size, const char *name);
 /// Writes a whole refusal. Returns its length; 0 if it does not fit.
 size_t iwn_write_refusal(char *data, size_t size, const iwn_id_t *id, const iwn_refusal_t *refusal);
 
+/// Returns true if speeds in mm/s are valid: they depend on the radius, and on the gear ratio if the wheels report the
+/// rpm of the rotor. Inline: the writer of a snapshot is its main user.
+static inline bool iwn_is_speed_known(const iw_snapshot_t *seen) {
+    return seen->assumed[IW_ASSUMPTION_WHEEL_RADIUS].state != IW_CONTRADICTED &&
+           !(seen->config->rpm_of_rotor && seen->assumed[IW_ASSUMPTION_GEAR_RATIO].state == IW_CONTRADICTED);
+}
+
+#ifdef __cplusplus
+}
+#endif
 #endif

@@ -19,6 +19,10 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /// Length of the longest text in bytes: a position in it has 16 bits.
 #define IWN_JSON_MAX 65536U
 /// Deepest nesting. Requests need 2.
@@ -103,4 +107,7 @@ uint32_t iwn_json_character(iwn_json_t *rest);
 /// Returns the value of an integer.
 int64_t iwn_json_integer(iwn_json_t value);
 
+#ifdef __cplusplus
+}
+#endif
 #endif

@@ -20,6 +20,10 @@
 #include <stdint.h>
 #include <string.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /// A line that is being written, in a buffer of the owner.
 typedef struct {
     char *data;    ///< The buffer.
@@ -59,7 +63,8 @@ void iwn_out_string(iwn_out_t *self, iwn_span_t name, const char *text);
 
 /// Returns the span of a terminated text; empty for NULL.
 static inline iwn_span_t iwn_span(const char *text) {
-    return (iwn_span_t){text, (text != NULL) ? strlen(text) : 0U};
+    const iwn_span_t span = {text, (text != NULL) ? strlen(text) : 0U};
+    return span;
 }
 
 #ifdef __OPTIMIZE_SIZE__
@@ -99,4 +104,7 @@ IWN_OUT_INLINE void iwn_out_text(iwn_out_t *self, const char *name, const char *
 #include "iwheel_northbound/json_out_inline.h"
 #endif
 
+#ifdef __cplusplus
+}
+#endif
 #endif

@@ -18,6 +18,10 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define IWN_LINE_CHANNELS  8U   ///< Highest channel of a client; channel 0 is the wire itself.
 #define IWN_LINE_BOARD_MAX 512U ///< Bytes of a line to the board, with its newline.
 #define IWN_LINE_PREFIX    23U  ///< Largest number of bytes before the JSON: channel, stamp and two spaces.
@@ -105,4 +109,7 @@ size_t iwn_quote_write(const iwn_quote_t *quote, const char *json, size_t length
 /// field. Returns false and changes nothing if the first three fields are not a quote in exactly this form.
 bool iwn_quote_take(char **json, size_t *length, iwn_quote_t *out_quote);
 
+#ifdef __cplusplus
+}
+#endif
 #endif

@@ -7,6 +7,10 @@
 
 #include "iwheel_northbound/request.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /// Data of a message in addition to the request. The comment of a text states whether it may be NULL.
 typedef struct {
     const iw_snapshot_t *seen; ///< Present snapshot.
@@ -54,4 +58,7 @@ void iwn_refuse_describe(const iwn_refuse_context_t *context, const iwn_request_
 /// Does the same for a tare that was refused for this wheel.
 void iwn_refuse_describe_tare(iw_side_t side, iw_tare_t result, iwn_refusal_t *out_refusal);
 
+#ifdef __cplusplus
+}
+#endif
 #endif

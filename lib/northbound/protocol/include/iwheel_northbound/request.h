@@ -14,6 +14,10 @@
 #include "iwheel_northbound/json_in.h"
 #include "iwheel_northbound/words.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /// Largest number of bytes of a request without its newline.
 #define IWN_LINE_MAX        4096U
 #define IWN_ID_TEXT_MAX     64U  ///< Bytes of an id that is a text.
@@ -43,6 +47,7 @@ typedef enum {
     IWN_CMD_CONFIRM,
     IWN_CMD_RECORDINGS,
     IWN_CMD_RECORDING,
+    IWN_CMD_RECORD,
     IWN_CMD_CONFIG,
     IWN_CMDS,
 } iwn_cmd_t;
@@ -56,11 +61,11 @@ bool iwn_cmd_stops(iwn_cmd_t cmd);
 /// Type of the id of a request.
 typedef enum { IWN_ID_NONE = 0, IWN_ID_NUMBER, IWN_ID_TEXT } iwn_id_kind_t;
 
-/// Id that the reply repeats.
+/// Id that the reply repeats. The order of the members has the least padding.
 typedef struct {
-    iwn_id_kind_t kind;              ///< Type of the id, or none.
     int64_t number;                  ///< As sent.
     char text[IWN_ID_TEXT_MAX + 1U]; ///< As sent.
+    iwn_id_kind_t kind;              ///< Type of the id, or none.
 } iwn_id_t;
 
 /// Only the fields of its `cmd` are valid. Numbers are as sent: any 64-bit integer.
@@ -81,6 +86,7 @@ typedef struct {
     bool has_stop;                          ///< `stop` is present.
     bool has_current;                       ///< Both currents are present.
     bool takeover;                          ///< arm.
+    bool on;                                ///< record: begin; otherwise end.
     bool has_commit;                        ///< config: `commit` is present.
     bool commit;                            ///< config, with `has_commit`.
     uint8_t topics;                         ///< watch: bit mask of iwn_topic_t.
@@ -113,4 +119,7 @@ bool iwn_refuse(iwn_refusal_t *out_refusal, iwn_error_t error, const char *const
 bool iwn_request_read(const char *line, size_t length, iwn_work_t *work, iwn_request_t *out_request,
                       iwn_refusal_t *out_refusal);
 
+#ifdef __cplusplus
+}
+#endif
 #endif

@@ -15,6 +15,10 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /// Code point of a byte that is not UTF-8.
 #define IWN_PLAIN_BROKEN UINT32_MAX
 
@@ -44,6 +48,7 @@ size_t iwn_utf8(uint32_t code_point, char out_bytes[4]);
 /// Writes the decimal digits of a number so that they end at `end`; 20 bytes before it must be writable. Returns their
 /// beginning.
 char *iwn_digits(int64_t number, char *end);
+char *iwn_digits_unsigned(uint64_t number, char *end);
 #define IWN_DIGITS_MAX 20U ///< Bytes of the longest number, with its sign.
 
 /// Returns the number of bytes that `iwn_digits` writes for a number.
@@ -64,6 +69,7 @@ void iwn_text_span(iwn_text_t *self, const char *text, size_t length);
 void iwn_text_add(iwn_text_t *self, const char *text);
 /// Appends decimal digits.
 void iwn_text_int(iwn_text_t *self, int64_t number);
+void iwn_text_unsigned(iwn_text_t *self, uint64_t number);
 /// Appends this number of hexadecimal digits, upper case.
 void iwn_text_hex(iwn_text_t *self, uint32_t number, unsigned digits);
 
@@ -72,4 +78,7 @@ void iwn_text_hex(iwn_text_t *self, uint32_t number, unsigned digits);
 /// Appends texts; the last one is NULL.
 void iwn_text_join(iwn_text_t *self, const char *const *texts);
 
+#ifdef __cplusplus
+}
+#endif
 #endif

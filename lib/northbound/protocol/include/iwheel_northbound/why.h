@@ -7,6 +7,10 @@
 
 #include "iwheel/gateway.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define IWN_SENTENCE_SIZE 640U ///< Size of the longest sentence, with its terminator.
 
 /// Data about a stop outside the core. `client` and `reason` may be NULL.
@@ -34,4 +38,7 @@ const char *iwn_why_fix(iw_cause_t cause);
 /// Returns the next step after the fix: the reset if the cause latches. Separate, because most causes have it.
 const char *iwn_why_then(iw_cause_t cause);
 
+#ifdef __cplusplus
+}
+#endif
 #endif

@@ -7,6 +7,10 @@
 
 #include "iwheel/gateway.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /// Errors of the protocol: docs/user/northbound.md.
 typedef enum {
     IWN_OK = 0,
@@ -94,4 +98,7 @@ const char *iwn_assumption_state_name(iw_assumption_state_t state);
 /// Returns the name of a source, for example "document".
 const char *iwn_source_name(iw_source_t source);
 
+#ifdef __cplusplus
+}
+#endif
 #endif

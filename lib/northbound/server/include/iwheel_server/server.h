@@ -17,6 +17,10 @@
 #include "iwheel_northbound/contents.h"
 #include "iwheel_northbound/refuse.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /// A repeated software e-stop within this time while its latch holds is answered and changes nothing.
 #define IWN_ESTOP_AGAIN_US 100000U
 /// Time after the start in which the first telemetry arrives. Before it a wheel without telemetry is not reported as a
@@ -25,15 +29,15 @@
 /// Shortest interval between reports of the fault `rolling`: clients store faults, and people push a walker by hand.
 #define IWN_ROLLING_FAULT_US 60000000U
 
-/// Data of one client in the protocol.
+/// Data of one client in the protocol. The order of the members has the least padding.
 typedef struct {
     iw_client_t id;               ///< Never reused for another connection.
+    uint32_t rate_hz;             ///< Rate of the periodic events.
+    iw_time_us_t next_us;         ///< Time of the next periodic event.
     bool watches_only;            ///< The client may only watch, stop and e-stop.
     bool arming;                  ///< An accepted arm request of it has no reply yet.
     bool due;                     ///< A periodic event is due in this cycle.
     uint8_t topics;               ///< Bit mask of the watched topics (iwn_topic_t).
-    uint32_t rate_hz;             ///< Rate of the periodic events.
-    iw_time_us_t next_us;         ///< Time of the next periodic event.
     char name[IWN_NAME_MAX + 1U]; ///< Name from arm; empty if there is none.
 } iwn_client_t;
 
@@ -145,4 +149,7 @@ void iwn_server_write_status(iwn_server_t *self, const iw_snapshot_t *seen, iwn_
 /// Sends the event `hello` to a new client.
 void iwn_server_hello(iwn_server_t *self, iwn_client_t *client);
 
+#ifdef __cplusplus
+}
+#endif
 #endif

@@ -7,6 +7,10 @@
 
 #include "iwheel_server/server.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 // Clients and lines.
 
 /// Returns the connected client after `after` in a fixed order; the first one if it is NULL. Returns NULL at the end.
@@ -111,4 +115,7 @@ void iwn_target_write_terms(iwn_server_t *self, const iwn_client_t *client, iwn_
 /// Writes more fields of the reply to `why`: recording and frames.
 void iwn_target_write_why(iwn_server_t *self, iwn_out_t *json);
 
+#ifdef __cplusplus
+}
+#endif
 #endif

@@ -1,28 +1,58 @@
 // SPDX-License-Identifier: MIT
-#include "bxcan_rig.h"
+#include "can_rig.h"
 
 #include "unity.h"
 
 #include <string.h>
 
 #define STORM     100000
-#define IER       0x14U
 #define RESET_BIT 0x02000000U
 
 rig_device_t rig[RIG_DEVICES];
 static bool is_serving;
 
+static bool is_inside(const brd_register_t *address, const void *window, size_t size, uint32_t *out_offset) {
+    const uintptr_t base = (uintptr_t)window;
+    const uintptr_t at = (uintptr_t)address;
+    *out_offset = (uint32_t)(at - base);
+    return at >= base && at < base + size;
+}
+
 static rig_device_t *device_at(const brd_register_t *address, uint32_t *out_offset) {
     for (int i = 0; i < RIG_DEVICES; i++) {
-        const uintptr_t base = (uintptr_t)&rig[i].window;
-        const uintptr_t at = (uintptr_t)address;
-        if (at >= base && at < base + sizeof rig[i].window) {
-            *out_offset = (uint32_t)(at - base);
+        if (is_inside(address, &rig[i].window, sizeof rig[i].window, out_offset)) {
             return &rig[i];
         }
+#ifdef IWHEEL_RIG_FDCAN
+        if (is_inside(address, &rig[i].ram, sizeof rig[i].ram, out_offset)) {
+            *out_offset += FDCAN_MODEL_RAM;
+            return &rig[i];
+        }
+#endif
     }
     TEST_FAIL_MESSAGE("an address was accessed that is no register");
     return NULL;
+}
+
+/// Returns false if no interrupt waits.
+static bool serve_one(rig_device_t *device) {
+#ifdef IWHEEL_RIG_FDCAN
+    if (fdcan_model_lines(&device->model) == 0U) {
+        return false;
+    }
+    brd_fdcan_on_interrupt(&device->driver);
+#else
+    if (bxcan_model_irq_transmit(&device->model)) {
+        brd_bxcan_on_transmit(&device->driver);
+    } else if (bxcan_model_irq_fifo0(&device->model)) {
+        brd_bxcan_on_receive(&device->driver);
+    } else if (bxcan_model_irq_error(&device->model)) {
+        brd_bxcan_on_error(&device->driver);
+    } else {
+        return false;
+    }
+#endif
+    return true;
 }
 
 static void serve(rig_device_t *device) {
@@ -30,16 +60,7 @@ static void serve(rig_device_t *device) {
         return;
     }
     is_serving = true;
-    for (int storm = 0;; storm++) {
-        if (bxcan_model_irq_transmit(&device->model)) {
-            brd_bxcan_on_transmit(&device->driver);
-        } else if (bxcan_model_irq_fifo0(&device->model)) {
-            brd_bxcan_on_receive(&device->driver);
-        } else if (bxcan_model_irq_error(&device->model)) {
-            brd_bxcan_on_error(&device->driver);
-        } else {
-            break;
-        }
+    for (int storm = 0; serve_one(device); storm++) {
         device->interrupts++;
         TEST_ASSERT_TRUE_MESSAGE(storm < STORM, "an interrupt never ends");
     }
@@ -62,9 +83,10 @@ uint32_t brd_register_read(const brd_register_t *address) {
         return *address;
     }
     rig_device_t *const device = device_at(address, &offset);
-    TEST_ASSERT_TRUE_MESSAGE(is_serving || !device->mask_unread || offset == IER, "the mask was not read back");
+    TEST_ASSERT_TRUE_MESSAGE(is_serving || !device->mask_unread || offset == RIG_MASK_REGISTER,
+                             "the mask was not read back");
     device->mask_unread = device->mask_unread && is_serving;
-    const uint32_t value = bxcan_model_read(&device->model, offset);
+    const uint32_t value = can_model_read(&device->model, offset);
     if (device->on_read != NULL && !is_serving && !device->on_read(offset)) {
         device->on_read = NULL;
     }
@@ -78,17 +100,17 @@ void brd_register_write(brd_register_t *address, uint32_t value) {
     if (resetting != NULL) {
         TEST_ASSERT_EQUAL_HEX32_MESSAGE(0, value & ~RESET_BIT, "another device was reset too");
         *address = value;
-        bxcan_model_reset(&resetting->model, 28);
+        can_model_reset(&resetting->model, 28);
         resetting->mask_unread = false;
         return;
     }
     rig_device_t *const device = device_at(address, &offset);
     TEST_ASSERT_TRUE_MESSAGE(is_serving || !device->mask_unread, "the mask was not read back");
-    device->mask_unread = !is_serving && offset == IER && (value & BRD_IER_TMEIE) == 0U;
+    device->mask_unread = !is_serving && offset == RIG_MASK_REGISTER && (value & RIG_MASK_BITS) == 0U;
     if (device->on_write != NULL && !is_serving) {
         device->on_write(offset);
     }
-    bxcan_model_write(&device->model, offset, value);
+    can_model_write(&device->model, offset, value);
     serve(device);
 }
 
@@ -101,50 +123,84 @@ void rig_reset(void) {
         rig[i].reset = 0;
         rig[i].mask_unread = false;
         rig[i].interrupts = 0;
-        bxcan_model_reset(&rig[i].model, 28);
+        can_model_reset(&rig[i].model, 28);
     }
 }
 
 void rig_init(int device, bool silent) {
+#ifdef IWHEEL_RIG_FDCAN
+    const brd_fdcan_config_t config = {
+        .registers = &rig[device].window,
+        .ram = &rig[device].ram,
+#else
     const brd_bxcan_config_t config = {
         .registers = &rig[device].window,
         .filters = &rig[0].window,
         .first_bank = (device == 0) ? 0U : 14U,
-        .bit_timing = 0x03590001U,
+#endif
+        .bit_timing = RIG_TIMING,
         .poll_limit = 1000,
         .silent = silent,
         .reset_register = &rig[device].reset,
         .reset_bits = RESET_BIT,
     };
-    brd_bxcan_init(&rig[device].driver, &config);
+    can_init(&rig[device].driver, &config);
 }
 
 void rig_start(int device) {
     rig_init(device, false);
-    (void)brd_bxcan_bus_state(&rig[device].driver);
-    bxcan_model_recessive(&rig[device].model, 11);
-    TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, brd_bxcan_bus_state(&rig[device].driver));
+    (void)can_bus_state(&rig[device].driver);
+    can_model_recessive(&rig[device].model, 11);
+    TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, can_bus_state(&rig[device].driver));
 }
 
 bool rig_send_next(int device, model_frame_t *out_frame) {
-    bxcan_model_t *const model = &rig[device].model;
-    const int mailbox = bxcan_model_offer(model, out_frame);
+    can_model_t *const model = &rig[device].model;
+    const int mailbox = can_model_offer(model, out_frame);
     if (mailbox == MODEL_NONE) {
         return false;
     }
-    bxcan_model_begin(model, mailbox);
-    bxcan_model_end(model, mailbox, MODEL_SENT);
+    can_model_begin(model, mailbox);
+    can_model_end(model, mailbox, MODEL_SENT);
     serve(&rig[device]);
     return true;
 }
 
-uint32_t rig_read_esr(int device) {
-    return brd_register_read(&rig[device].driver.config.registers->ESR);
+void rig_serve(int device) {
+    serve(&rig[device]);
 }
+
+#ifdef IWHEEL_RIG_FDCAN
+uint32_t rig_read_tec(int device) {
+    return brd_register_read(&rig[device].window.ECR) & BRD_ECR_TEC;
+}
+
+uint32_t rig_read_rec(int device) {
+    const uint32_t ecr = brd_register_read(&rig[device].window.ECR);
+    return ((ecr & 0x8000U) != 0U) ? 128U : (ecr & BRD_ECR_REC) >> 8;
+}
+
+void rig_assert_lec(int device, uint32_t code) {
+    (void)device;
+    (void)code;
+}
+#else
+uint32_t rig_read_tec(int device) {
+    return brd_register_read(&rig[device].window.ESR) >> 16 & 0xFFU;
+}
+
+uint32_t rig_read_rec(int device) {
+    return brd_register_read(&rig[device].window.ESR) >> 24 & 0xFFU;
+}
+
+void rig_assert_lec(int device, uint32_t code) {
+    TEST_ASSERT_EQUAL(code, brd_register_read(&rig[device].window.ESR) >> 4 & 7U);
+}
+#endif
 
 bool rig_hear(int device, uint32_t id, uint8_t dlc) {
     const model_frame_t frame = {.id = id, .dlc = dlc, .data = {1, 2, 3, 4, 5, 6, 7, 8}};
-    const bool acknowledged = bxcan_model_receive(&rig[device].model, &frame);
+    const bool acknowledged = can_model_receive(&rig[device].model, &frame);
     serve(&rig[device]);
     return acknowledged;
 }
@@ -155,6 +211,6 @@ iw_can_frame_t rig_frame(uint32_t id, uint8_t mark) {
 
 void rig_assert_no_violation(void) {
     for (int i = 0; i < RIG_DEVICES; i++) {
-        TEST_ASSERT_EQUAL_STRING("", bxcan_model_violation(&rig[i].model));
+        TEST_ASSERT_EQUAL_STRING("", can_model_violation(&rig[i].model));
     }
 }

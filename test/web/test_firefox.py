@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: MIT
+"""The page in Debian's Firefox. Pinch and drag of the plots are tested in Chromium only: WebDriver BiDi has no gesture of two fingers that zooms."""
+
+import json
+import os
+from pathlib import Path
+
+import pytest
+from bus import now_us
+from firefox import ASSETS, firefox_page
+from test_browser import SIZES, turns
+from test_first_screen import AREAS, FIGURES, VIEWS
+from trials import Driver, braking_ms, until
+
+LIVE = "document.querySelector('#news').className === 'good'"
+
+
+def shot(page, name, whole=False):
+    if os.environ.get("IWHEEL_WEB_SHOTS"):
+        page.picture(Path(os.environ["IWHEEL_WEB_SHOTS"]) / f"firefox-{name}.png", whole)
+
+
+def all_seen(page, ids, what):
+    for area in page.evaluate(f"({AREAS})({json.dumps(ids)})"):
+        assert area["inside"] and area["card"] and area["free"] and area["whole"] and area["text"].strip(), (what, area)
+
+
+def stands(rig):
+    until(lambda: rig.ask_json("GET", "/api/status")[1]["state"] == "listening", what="the wheels are at standstill")
+
+
+@pytest.mark.rig(driving=True)
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_firefox_first_screen_has_state_and_figures(rig, scheme):
+    rig.start().connected()
+    rig.sim.ask("estop press")
+    until(lambda: rig.ask_json("GET", "/api/stops")[1]["stops"], what="the stop is known")
+    with firefox_page(rig.url, *SIZES["portrait"], scheme) as page:
+        page.seen(LIVE)
+        page.seen("document.querySelector('#last-stop').textContent.includes('e-stop pressed')")
+        for size in VIEWS:
+            page.size(*SIZES[size])
+            page.seen(f"innerWidth === {SIZES[size][0]} && innerHeight === {SIZES[size][1]}")
+            all_seen(page, ["word", "sentence", "reset", "last-stop", *FIGURES, "stop"], size)
+            assert page.text("#word") == "Latched" and page.text("#big-estop") == "PRESSED"
+            assert page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth") <= 0, size
+            shot(page, f"latched-{size}-{scheme}")
+        axe = ASSETS / "axe-core-4.14.1/axe.min.js"
+        if axe.is_file():
+            page.run(axe.read_text(encoding="utf-8"))
+            found = page.evaluate("axe.run(document, {resultTypes: ['violations']})")["violations"]
+            assert not found, [(one["id"], [node["target"] for node in one["nodes"]][:4]) for one in found]
+
+
+@pytest.mark.rig(driving=True)
+def test_firefox_stop_acts_by_each_input_above_dialogs(rig):
+    rig.start().connected()
+    with firefox_page(rig.url, *SIZES["small"]) as page:
+        page.seen(LIVE)
+        for text, question, way in ((100, "#estop-ask", "mouse"), (200, "#arm", "touch"), (100, "#arm", "s"), (200, "#estop-ask", "Enter")):
+            page.run(f"document.documentElement.style.fontSize = '{text}%'")
+            page.run(f"document.querySelector('{question}').click()")
+            page.seen("document.querySelector('#ask').open")
+            all_seen(page, ["stop"], (text, question))
+            shot(page, f"stop-{text}-{question[1:]}")
+            if way == "Enter":
+                page.run("document.querySelector('#stop').focus()")
+            driver = Driver(rig)
+            since = now_us()
+            if way in ("mouse", "touch"):
+                page.pointer(way, page.middle("#stop"), "down")
+            else:
+                page.key(way)
+            late = braking_ms(rig, since)
+            assert late < 1000, f"{way}: {late} ms"
+            page.let_go()
+            assert not page.evaluate("document.querySelector('#ask').open"), "STOP answers the question with no"
+            page.seen("document.querySelector('#delivered').textContent.startsWith('Stop delivered')")
+            driver.end()
+            driver.client.close()
+            stands(rig)
+
+
+@pytest.mark.rig(driving=True)
+def test_firefox_pad_drives_by_touch_until_released(rig):
+    rig.start().connected()
+    with firefox_page(rig.url, *SIZES["portrait"]) as page:
+        page.seen(LIVE)
+        page.click("#arm")
+        page.click("#ask-yes")
+        page.seen("drive.on")
+        x, y = page.middle("#pad")
+        for end in ("released", "second finger", "view"):
+            page.pointer("touch", (x, y - 80), "down")
+            page.pointer("touch", (x + 2, y - 82))
+            turns(rig)
+            shot(page, "pad")
+            since = now_us()
+            if end == "released":
+                page.pointer("touch", "up")
+            elif end == "second finger":
+                page.pointer("touch", (20, 20), "down", finger=1)
+            else:
+                page.size(*SIZES["landscape"])
+            late = braking_ms(rig, since)
+            assert late < 1000, f"{end}: {late} ms"
+            assert not page.evaluate("drive.held"), end
+            page.let_go()
+            stands(rig)
+            until(lambda: rig.ask_json("GET", "/api/status")[1]["lease"]["holder"] is None, what="nobody drives")
+
+
+def test_firefox_plays_a_recording_and_speaks_german(rig):
+    rig.start().connected()
+    driver = Driver(rig)
+    until(lambda: (rig.bus.speed_rpm(0) or 0) >= 9, what="180 mm/s are measured")
+    rig.sim.ask("estop press")
+    until(lambda: (found := rig.ask_json("GET", "/api/recordings")[1].get("recordings")) and found[0]["jsonl_bytes"], 8, "a recording")
+    driver.end()
+    with firefox_page(rig.url, *SIZES["portrait"], language="de-AT, de") as page:
+        page.seen(LIVE)
+        assert page.text("#word") == "Gesperrt" and page.evaluate("document.documentElement.lang") == "de"
+        page.seen("document.querySelector('#recordings button') !== null")
+        page.click("#recordings button")
+        page.seen("!document.querySelector('#player').hidden && !document.querySelector('#left .at').hidden")
+        assert not page.evaluate("document.querySelector('#left > details').checkVisibility()"), "no live figure under the heading of a recording"
+        page.run("goTo(-0.03)")
+        page.seen("parseInt(document.querySelector('#left .plot .measured b').textContent) > 100")
+        shot(page, "recording")
+        page.click("#live")
+        page.seen("document.querySelector('#player').hidden")
