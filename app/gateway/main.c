@@ -61,7 +61,7 @@ static void listen_to_watchers(gw_daemon_t *daemon) {
     }
 }
 
-static void tell_start(gw_daemon_t *daemon) {
+static void report_start(gw_daemon_t *daemon) {
     const gw_wheels_t *wheels = &daemon->wheels;
     gw_report_start(&daemon->config, wheels->hal.estop_ops->simulated, daemon->clients.listener[SOCK_WATCH].fd >= 0,
                     &daemon->log);
@@ -86,7 +86,7 @@ static int serve(gw_daemon_t *daemon) {
     }
     if (result == 0) {
         gw_notify_open(&daemon->notify);
-        tell_start(daemon);
+        report_start(daemon);
         const int error = gw_loop_run(daemon);
         if (error != 0) {
             sock_log(&daemon->log, SOCK_LOG_ERROR, "waiting for events failed: %s", strerror(error));

@@ -13,11 +13,11 @@
 #define LINE_MAX_BYTES 320U
 #define US_PER_S       1000000U
 
-bool sim_bus_log_open(sim_bus_log_t *self, const char *path, bool tell_direction) {
+bool sim_bus_log_open(sim_bus_log_t *self, const char *path, bool write_direction) {
     self->oldest_us = IW_NEVER;
     self->used = 0U;
     self->fd = -1;
-    self->tell_direction = tell_direction;
+    self->write_direction = write_direction;
     if (path == NULL) {
         return true;
     }
@@ -69,7 +69,7 @@ void sim_bus_log_frame(sim_bus_log_t *self, iw_time_us_t at_us, const iw_can_fra
     }
     candump_t written = candump_from_core(frame, (int64_t)at_us, "sim");
     const candump_mark_t sender = from_client ? CANDUMP_SENT : CANDUMP_RECEIVED;
-    written.mark = self->tell_direction ? sender : CANDUMP_UNMARKED;
+    written.mark = self->write_direction ? sender : CANDUMP_UNMARKED;
     if (written.remote) {
         written.length = 0U;
     }

@@ -18,13 +18,13 @@ typedef struct {
     iw_time_us_t oldest_us; ///< Time of the oldest waiting line; IW_NEVER: no line waits.
     size_t used;
     int fd; ///< -1: no log.
-    bool tell_direction;
+    bool write_direction;
     char buffer[SIM_LOG_BUFFER];
 } sim_bus_log_t;
 
-/// Opens the log. `path` NULL: no log; "-": standard output. With `tell_direction` a line ends in " T" (a client sent
+/// Opens the log. `path` NULL: no log; "-": standard output. With `write_direction` a line ends in " T" (a client sent
 /// the frame) or " R". Returns false, with errno, if the file cannot be created.
-bool sim_bus_log_open(sim_bus_log_t *self, const char *path, bool tell_direction);
+bool sim_bus_log_open(sim_bus_log_t *self, const char *path, bool write_direction);
 
 void sim_bus_log_frame(sim_bus_log_t *self, iw_time_us_t at_us, const iw_can_frame_t *frame, bool from_client);
 void sim_bus_log_mark(sim_bus_log_t *self, iw_time_us_t at_us, const char *text);

@@ -57,7 +57,7 @@ static void skip_line(candump_reader_t *self) {
     }
 }
 
-static candump_read_t tell_bad(candump_reader_t *self, const char *why) {
+static candump_read_t report_bad(candump_reader_t *self, const char *why) {
     self->why = why;
     return CANDUMP_READ_BAD;
 }
@@ -71,15 +71,15 @@ static candump_read_t read_rest(candump_reader_t *self, candump_t *frame) {
     self->line++;
     if (there >= CANDUMP_READ_MAX) {
         skip_line(self);
-        return tell_bad(self, "longer than any frame; is this a recording in candump's log form?");
+        return report_bad(self, "longer than any frame; is this a recording in candump's log form?");
     }
     const char *why = "";
     const candump_result_t result = candump_parse(&self->buffer[self->begin], there, frame, &why);
     self->begin = self->end;
     return (result == CANDUMP_EMPTY)
                ? CANDUMP_READ_END
-               : tell_bad(self, "the last line has no line end, so it may be cut and is left out; "
-                                "if it is whole, add the line end");
+               : report_bad(self, "the last line has no line end, so it may be cut and is left out; "
+                                  "if it is whole, add the line end");
 }
 
 /// Skips a byte order mark. Returns false and sets `why` if the first line is in another form.

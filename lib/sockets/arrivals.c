@@ -65,10 +65,11 @@ static void turn_away(sock_clients_t *self, sock_client_t *client) {
     sock_service_refuse_crowd(self, client, &refusal);
     sock_clients_refuse(self, client, &nobody, &refusal);
     sock_service_finish(self, client);
-    if (!listener->full_told) {
+    if (!listener->full_reported) {
         sock_log(self->log, SOCK_LOG_WARNING, "refused a client: %s", refusal.message);
     }
-    listener->full_told = listener->config.right == SOCK_WATCH; // A flood of these must not displace other messages.
+    listener->full_reported =
+        listener->config.right == SOCK_WATCH; // A flood of these must not displace other messages.
 }
 
 static sock_client_t *free_slot(sock_clients_t *self, sock_right_t right) {
@@ -184,7 +185,7 @@ static bool accept_one(sock_clients_t *self, sock_listener_t *listener) {
     (void)getsockopt(newcomer.fd, SOL_SOCKET, SO_PEERCRED, &newcomer.peer, &length);
     sock_client_t *client = (result == SOCK_ACCEPT_ONE) ? free_slot(self, listener->config.right) : NULL;
     if (client != NULL) {
-        listener->full_told = false;
+        listener->full_reported = false;
         (void)admit(self, client, &newcomer, listener->config.right);
     } else {
         receive_stop(self, &newcomer, listener->config.right, result == SOCK_ACCEPT_ONE);

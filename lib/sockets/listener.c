@@ -190,7 +190,7 @@ static int make_socket(sock_listener_t *self, FILE *err) {
     return result;
 }
 
-static void give_to_group(const sock_listener_t *self, sock_log_t *log) {
+static void assign_group(const sock_listener_t *self, sock_log_t *log) {
     const char *name = self->config.group;
     if (strcmp(name, "none") == 0) {
         return;
@@ -221,7 +221,7 @@ static void restore(sock_listener_t *self) {
 int sock_listener_open(sock_listener_t *self, sock_log_t *log, FILE *err) {
     int result = make_socket(self, err);
     if (result == 0) {
-        give_to_group(self, log);
+        assign_group(self, log);
         result = (listen(self->fd, BACKLOG) == 0) ? 0 : complain_errno(self, err, errno);
     }
     if (result != 0) {

@@ -56,7 +56,7 @@ typedef struct {
     dev_t device; ///< Device and inode of the created socket, so that only this socket is removed.
     ino_t inode;
     iw_time_us_t from_us; ///< Earliest time of the next accept.
-    bool full_told;       ///< A rejection was logged, until the next client is accepted.
+    bool full_reported;   ///< A rejection was logged, until the next client is accepted.
     int fd;               ///< Descriptor; -1 if not open.
     int reserve_fd;
 } sock_listener_t;

@@ -59,7 +59,7 @@ static void on_connect(struct mosquitto *client, void *context, int code) {
     if (self->short_ones < SHORT_MAX) {
         (void)fprintf(stderr, "%s: connected to the broker at %s port %u\n", self->listener.program, self->host,
                       self->settings->broker.port);
-        self->told_away = false;
+        self->logged_away = false;
     }
     self->listener.up(self->listener.context);
 }
@@ -156,11 +156,11 @@ static void judge_end(mqtt_broker_t *self) {
 static void lose(mqtt_broker_t *self, const char *why) {
     const bool was_up = self->state == MQTT_UP;
     judge_end(self);
-    if (!self->told_away) {
+    if (!self->logged_away) {
         (void)fprintf(stderr, "%s: no broker at %s port %u (%s%s%s); retrying\n", self->listener.program, self->host,
                       self->settings->broker.port, why, (self->words[0] != '\0') ? "; " : "", self->words);
     }
-    self->told_away = true;
+    self->logged_away = true;
     mosquitto_destroy(self->client);
     self->client = NULL;
     self->state = MQTT_AWAY;

@@ -71,7 +71,7 @@ typedef struct {
     size_t next;               ///< Number of the host to try next.
     char *user;                ///< NULL: none.
     char *password;            ///< NULL if there is no `user`.
-    bool told_away;            ///< The absence is logged. Valid in every state: many tries in a row are one absence.
+    bool logged_away;          ///< The absence is logged. Valid in every state: many tries in a row are one absence.
     int subscriptions[4];      ///< Message numbers, in the order of the listener's topics.
     uint64_t up_us;            ///< Time at which the broker accepted this connection.
     unsigned short_ones;       ///< Short connections in a row.

@@ -51,7 +51,7 @@ static int read_credentials(const char *path, char **out_user, char **out_passwo
     return (*out_user != NULL && *out_password != NULL) ? 0 : EX_OSERR;
 }
 
-static int look_at_files(const mqtt_settings_t *settings) {
+static int check_files(const mqtt_settings_t *settings) {
     const char *const files[] = {settings->broker.ca, settings->broker.certificate, settings->broker.key};
     for (size_t i = 0; i < sizeof files / sizeof files[0]; i++) {
         if (mqtt_settings_given(files[i]) && access(files[i], R_OK) != 0) {
@@ -67,7 +67,7 @@ static int look_at_files(const mqtt_settings_t *settings) {
 }
 
 int mqtt_credentials_read(const mqtt_settings_t *settings, char **out_user, char **out_password) {
-    const int code = look_at_files(settings);
+    const int code = check_files(settings);
     return (code != 0 || !mqtt_settings_given(settings->broker.credentials))
                ? code
                : read_credentials(settings->broker.credentials, out_user, out_password);

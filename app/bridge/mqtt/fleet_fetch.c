@@ -257,7 +257,7 @@ static void show_list(const fetch_t *fetch) {
     (void)puts("");
 }
 
-static void tell_list(const fetch_t *fetch) {
+static void print_list(const fetch_t *fetch) {
     for (size_t i = 0; i < fetch->count; i++) {
         const fetch_recording_t *one = &fetch->list[i];
         char line[512];
@@ -278,7 +278,7 @@ static void tell_list(const fetch_t *fetch) {
 
 static int list(asking_t *self) {
     if (self->wanted->json) {
-        tell_list(&self->fetch);
+        print_list(&self->fetch);
     } else {
         show_list(&self->fetch);
     }
@@ -294,7 +294,7 @@ static void show_fetched(const asking_t *self) {
     (void)printf("why it stopped: iwheelctl why %s\nits frames:     iwheelctl decode %s\n", path, path);
 }
 
-static void tell_fetched(const asking_t *self) {
+static void print_fetched(const asking_t *self) {
     const fetch_t *fetch = &self->fetch;
     char line[2U * PATH_SIZE];
     iwn_out_t json;
@@ -323,7 +323,7 @@ static int fetch_one(asking_t *self) {
         return code;
     }
     if (self->wanted->json) {
-        tell_fetched(self);
+        print_fetched(self);
     } else {
         show_fetched(self);
     }

@@ -97,7 +97,7 @@ static void show_end(const history_t *self, const history_machine_t *machine, ui
     }
 }
 
-static void tell_end(const history_t *self, const history_machine_t *machine, uint64_t events, uint64_t stops) {
+static void print_end(const history_t *self, const history_machine_t *machine, uint64_t events, uint64_t stops) {
     char line[512];
     char cause[128];
     iwn_out_t json;
@@ -127,7 +127,7 @@ void history_end(history_t *self) {
         self->missing += events;
         self->unheard += stops;
         if (self->config.json) {
-            tell_end(self, machine, events, stops);
+            print_end(self, machine, events, stops);
         } else {
             show_end(self, machine, events, stops);
         }

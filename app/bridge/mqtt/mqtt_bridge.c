@@ -23,7 +23,7 @@ bool mqtt_bridge_state(const mqtt_bridge_t *self, iwc_message_t *out_state) {
     return self->link.state == BRIDGE_LINK_HERE && self->state_length > 0U;
 }
 
-static void tell_info(mqtt_bridge_t *self) {
+static void publish_info(mqtt_bridge_t *self) {
     iwc_message_t state;
     const mqtt_info_t info = {.boot = self->boot,
                               .settings = self->settings,
@@ -46,11 +46,11 @@ static void tell_info(mqtt_bridge_t *self) {
     const int message = mqtt_bridge_publish(self, "info", NULL, length, retained);
     self->info_due = message == MQTT_NOT_NOW;
     self->info_us = self->now_us;
-    self->told_waiting = self->spool.waiting;
+    self->logged_waiting = self->spool.waiting;
 }
 
 /// Publishes the availability. A machine without its gateway is offline.
-static void tell_availability(mqtt_bridge_t *self, bool always) {
+static void publish_availability(mqtt_bridge_t *self, bool always) {
     const bool online = self->link.state == BRIDGE_LINK_HERE && self->state_length > 0U;
     if (online != self->online || always) {
         const size_t length =
@@ -62,7 +62,7 @@ static void tell_availability(mqtt_bridge_t *self, bool always) {
 
 /// Adds an event to the spool. `stop_us` is the wall clock of the newest stop; it shows later whether a stop was
 /// missed.
-static void keep_event(mqtt_bridge_t *self, const char *name, size_t length, uint64_t stop_us) {
+static void store_event(mqtt_bridge_t *self, const char *name, size_t length, uint64_t stop_us) {
     if (length == 0U) {
         self->spool.dropped++;
         return;
@@ -72,7 +72,7 @@ static void keep_event(mqtt_bridge_t *self, const char *name, size_t length, uin
 
 /// Stores the last stop from an event or from a reply to `why`. A gateway that restarted knows none; the one before it
 /// then stays the last stop of this machine.
-static void remember_stop(mqtt_bridge_t *self, const iwc_message_t *stop) {
+static void store_stop(mqtt_bridge_t *self, const iwc_message_t *stop) {
     mqtt_stop_t *last = &self->stop;
     if (iwc_integer(stop, "number").value <= 0) {
         return;
@@ -86,8 +86,8 @@ static void remember_stop(mqtt_bridge_t *self, const iwc_message_t *stop) {
 
 static void take_stop(mqtt_bridge_t *self, const iwc_message_t *event) {
     const size_t length = mqtt_write_event(self->boot, self->spool.last + 1U, bridge_wall_us(), event, buffer(self));
-    keep_event(self, "stop", length, (uint64_t)iwc_integer(event, "wall_us").value);
-    remember_stop(self, event);
+    store_event(self, "stop", length, (uint64_t)iwc_integer(event, "wall_us").value);
+    store_stop(self, event);
     bridge_lease_end(&self->lease, self->now_us);
 }
 
@@ -95,12 +95,12 @@ static void take_why(void *context, const iwc_message_t *reply) {
     mqtt_bridge_t *self = context;
     const uint64_t stop_us = (reply != NULL) ? (uint64_t)iwc_integer(reply, "wall_us").value : 0U;
     if (reply != NULL) {
-        remember_stop(self, reply);
+        store_stop(self, reply);
     }
     if (reply != NULL && iwc_integer(reply, "number").value > 0 && stop_us != self->spool.mark) {
         const size_t length =
             mqtt_write_missed_stop(self->boot, self->spool.last + 1U, bridge_wall_us(), reply, buffer(self));
-        keep_event(self, "stop", length, stop_us);
+        store_event(self, "stop", length, stop_us);
     }
 }
 
@@ -132,7 +132,7 @@ static uint32_t rate_hz(uint32_t every_ms) {
     return (every_ms < 1000U) ? 1000U / every_ms : 1U;
 }
 
-static void tell_state(mqtt_bridge_t *self, const iwc_message_t *state, const char *condition, bool spare) {
+static void publish_state(mqtt_bridge_t *self, const iwc_message_t *state, const char *condition, bool spare) {
     // MQTT 5: a state that is older than the next one is useless.
     const mqtt_way_t way = {.spare = spare, .labels = {.expiry_s = self->settings->state.every_ms / 1000U + 1U}};
     if (mqtt_bridge_publish(self, "state", NULL, mqtt_write_state(self->boot, state, buffer(self)), way) !=
@@ -154,11 +154,11 @@ static void take_state(mqtt_bridge_t *self, const iwc_message_t *state) {
     const uint32_t line_ms = 1000U / rate_hz(every_ms);
     if (strcmp(condition, self->condition) != 0 ||
         self->now_us - self->state_us >= ((uint64_t)every_ms * 2U - line_ms) * 500U) {
-        tell_state(self, state, condition, true);
+        publish_state(self, state, condition, true);
     }
     if (first) {
-        tell_availability(self, false);
-        tell_info(self);
+        publish_availability(self, false);
+        publish_info(self);
     }
 }
 
@@ -195,7 +195,7 @@ static void take_event(void *context, const iwc_message_t *event, uint64_t now_u
         }
         const size_t length =
             mqtt_write_event(self->boot, self->spool.last + 1U, bridge_wall_us(), event, buffer(self));
-        keep_event(self, name, length, self->spool.mark);
+        store_event(self, name, length, self->spool.mark);
     }
     mqtt_events_send(self);
 }
@@ -210,20 +210,20 @@ static void gateway_gone(void *context, uint64_t now_us) {
     self->state_length = 0;
     self->condition[0] = '\0';
     bridge_lease_end(&self->lease, now_us);
-    tell_availability(self, false);
-    tell_info(self);
+    publish_availability(self, false);
+    publish_info(self);
 }
 
 static void broker_up(void *context) {
     mqtt_bridge_t *self = context;
     iwc_message_t state;
     char condition[sizeof self->condition];
-    tell_availability(self, true);
+    publish_availability(self, true);
     if (mqtt_bridge_state(self, &state)) {
         read_condition(&state, condition, sizeof condition);
-        tell_state(self, &state, condition, false);
+        publish_state(self, &state, condition, false);
     }
-    tell_info(self);
+    publish_info(self);
     mqtt_sensors_send(self);
     mqtt_events_begin(self);
     mqtt_events_send(self);
@@ -326,26 +326,26 @@ int mqtt_bridge_open(mqtt_bridge_t *self, const mqtt_settings_t *settings) {
 
 static void poll_events(mqtt_bridge_t *self) {
     mqtt_spool_poll(&self->spool);
-    if (self->spool.behind != self->told_behind) {
-        self->told_behind = self->spool.behind;
+    if (self->spool.behind != self->logged_behind) {
+        self->logged_behind = self->spool.behind;
         (void)fprintf(stderr, "iwheel-mqtt: %s\n",
                       self->spool.behind
                           ? "the spool's disk accepts no data; events are stored in memory only; see df, dmesg"
                           : "the spool is on its disk again");
         self->info_due = true;
     }
-    if (self->spool.dropped != self->told_dropped) {
+    if (self->spool.dropped != self->logged_dropped) {
         (void)fprintf(stderr,
                       "iwheel-mqtt: events dropped so far: %llu; the spool was full, or an event too long: see max_kB "
                       "under [spool]\n",
                       (unsigned long long)self->spool.dropped);
-        self->told_dropped = self->spool.dropped;
+        self->logged_dropped = self->spool.dropped;
         self->info_due = true;
     }
     mqtt_events_poll(self);
     mqtt_sensors_poll(self);
     if (self->info_due || self->now_us - self->info_us >= INFO_US) {
-        tell_info(self);
+        publish_info(self);
     }
 }
 

@@ -52,7 +52,7 @@ typedef struct {
     bool careful;                     ///< The connection ended with events under way; none was confirmed since.
     uint64_t count;                   ///< Messages that were not accepted.
     uint64_t logged;                  ///< Value of `count` in the last log line.
-    uint64_t told_us;                 ///< Time from which the next log line is allowed.
+    uint64_t logged_us;               ///< Time from which the next log line is allowed.
     char last[MQTT_TOPIC_SIZE + 96U]; ///< Topic and reason of the last one; empty: none.
     mqtt_note_t notes[MQTT_NOTES_MAX];
     size_t note;    ///< Index of the next note.
@@ -81,13 +81,13 @@ typedef struct {
     uint64_t sensors_us;   ///< Deadline for the return of all sensors; 0: not waiting.
     uint32_t sensors_seen; ///< One bit for each sensor that returned.
     size_t sensors_sent;
-    uint64_t sent_number;  ///< Newest event that was sent to the broker in this connection.
-    bool info_due;         ///< The contents of `info` have changed.
-    bool online;           ///< Last published availability.
-    bool told_behind;      ///< The log contains that the disk accepts nothing.
-    size_t told_waiting;   ///< Waiting events in the last `info`.
-    uint64_t told_dropped; ///< Dropped events in the last log line.
-    char condition[128];   ///< Part of a state whose change is sent immediately.
+    uint64_t sent_number;    ///< Newest event that was sent to the broker in this connection.
+    bool info_due;           ///< The contents of `info` have changed.
+    bool online;             ///< Last published availability.
+    bool logged_behind;      ///< The log contains that the disk accepts nothing.
+    size_t logged_waiting;   ///< Waiting events in the last `info`.
+    uint64_t logged_dropped; ///< Dropped events in the last log line.
+    char condition[128];     ///< Part of a state whose change is sent immediately.
     char state[IWC_LINE_MAX + 1U];
     size_t state_length; ///< 0: unknown.
     mqtt_stop_t stop;    ///< Last stop that the gateway reported.

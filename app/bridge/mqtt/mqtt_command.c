@@ -150,9 +150,9 @@ static bool write_request(iwn_json_t root, mqtt_order_t *order) {
         (void)strncat(who, order->from, MQTT_SENDER_SIZE);
         iwn_out_text(&out, "name", who);
     }
-    int64_t told_us = 0;
-    if ((order->verb == MQTT_ARM || order->verb == MQTT_RESET) && number_of(root, "t_us", &told_us)) {
-        iwn_out_int(&out, "t_us", told_us); // The gateway judges its age, too, and whether a stop is newer.
+    int64_t logged_us = 0;
+    if ((order->verb == MQTT_ARM || order->verb == MQTT_RESET) && number_of(root, "t_us", &logged_us)) {
+        iwn_out_int(&out, "t_us", logged_us); // The gateway judges its age, too, and whether a stop is newer.
     }
     iwn_out_close(&out, '}');
     const size_t length = iwn_out_finish(&out);
@@ -194,20 +194,21 @@ static int64_t ttl_of(const mqtt_rules_t *rules, iwn_json_t root, mqtt_verb_t ve
 
 static bool judge_age(const mqtt_rules_t *rules, iwn_json_t root, uint64_t now_us, mqtt_order_t *order) {
     char boot[MQTT_BOOT_SIZE] = "";
-    int64_t told_us = -1;
+    int64_t logged_us = -1;
     const int64_t ttl_ms = ttl_of(rules, root, order->verb);
-    if (!text_of(root, "boot", boot, sizeof boot) || !number_of(root, "t_us", &told_us) || told_us < 0 || ttl_ms == 0) {
+    if (!text_of(root, "boot", boot, sizeof boot) || !number_of(root, "t_us", &logged_us) || logged_us < 0 ||
+        ttl_ms == 0) {
         return drop(order, MQTT_GARBLED,
                     "the command needs boot and t_us of a message of this machine; ttl_ms is 1 to 1000");
     }
     if (strcmp(boot, rules->boot) != 0) {
         return drop(order, MQTT_OTHER_BOOT, "send it again with boot and t_us of this reply");
     }
-    if ((uint64_t)told_us > now_us) {
+    if ((uint64_t)logged_us > now_us) {
         return drop(order, MQTT_EARLY,
                     "t_us is ahead of this machine; send it again with t_us of this reply, unchanged");
     }
-    if (now_us - (uint64_t)told_us > (uint64_t)ttl_ms * 1000U) {
+    if (now_us - (uint64_t)logged_us > (uint64_t)ttl_ms * 1000U) {
         return drop(order, MQTT_LATE,
                     "too long on the way, or t_us of an old message; send it again with t_us of this reply");
     }

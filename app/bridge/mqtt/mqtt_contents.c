@@ -129,7 +129,7 @@ size_t mqtt_write_answer(const char *boot, uint64_t now_us, const mqtt_order_t *
     return end(&out);
 }
 
-static void tell_counts(const mqtt_info_t *info, iwn_out_t *out) {
+static void write_counts(const mqtt_info_t *info, iwn_out_t *out) {
     iwn_out_open(out, "commands", '{');
     for (unsigned i = 0; i < (unsigned)MQTT_VERDICTS; i++) {
         iwn_out_int(out, mqtt_verdict_word((mqtt_verdict_t)i), (int64_t)info->counts[i]);
@@ -154,7 +154,7 @@ static void tell_counts(const mqtt_info_t *info, iwn_out_t *out) {
     }
 }
 
-static void tell_stop(const mqtt_stop_t *stop, iwn_out_t *out) {
+static void write_stop(const mqtt_stop_t *stop, iwn_out_t *out) {
     if (stop->number <= 0) {
         iwn_out_null(out, "last_stop");
         return;
@@ -185,8 +185,8 @@ size_t mqtt_write_info(const mqtt_info_t *info, mqtt_buffer_t buffer) {
     copy(state, "budget", "budget", &out);
     copy(state, "listen_only", "listen_only", &out);
     copy(state, "warnings", "warnings", &out);
-    tell_counts(info, &out);
-    tell_stop(info->stop, &out);
+    write_counts(info, &out);
+    write_stop(info->stop, &out);
     return end(&out);
 }
 
@@ -239,14 +239,14 @@ static const char *state_class_of(const sensor_t *sensor) {
     return (sensor->class != NULL && strcmp(sensor->class, "distance") == 0) ? "total" : "measurement";
 }
 
-static void tell_origin(iwn_out_t *out) {
+static void write_origin(iwn_out_t *out) {
     iwn_out_open(out, "origin", '{');
     iwn_out_text(out, "name", "iwheel-mqtt");
     iwn_out_text(out, "sw_version", IWHEEL_VERSION);
     iwn_out_close(out, '}');
 }
 
-static void tell_device(const mqtt_settings_t *settings, iwn_out_t *out) {
+static void write_device(const mqtt_settings_t *settings, iwn_out_t *out) {
     char text[64];
     iwn_out_open(out, "device", '{');
     iwn_out_open(out, "identifiers", '[');
@@ -287,8 +287,8 @@ bool mqtt_write_sensor(const mqtt_settings_t *settings, size_t number, char out_
     if (state_class_of(sensor) != NULL) {
         iwn_out_text(&out, "state_class", state_class_of(sensor));
     }
-    tell_origin(&out);
-    tell_device(settings, &out);
+    write_origin(&out);
+    write_device(settings, &out);
     if (end(&out) == 0U) {
         return false;
     }

@@ -130,7 +130,7 @@ static void settle_events(mqtt_bridge_t *self) {
             mqtt_spool_confirm(&self->spool, oldest.number);
         }
     }
-    self->info_due = self->info_due || (self->told_waiting > 0U && self->spool.waiting == 0U);
+    self->info_due = self->info_due || (self->logged_waiting > 0U && self->spool.waiting == 0U);
 }
 
 /// Returns the entry of an event under way; NULL if the message is not an event.
@@ -218,14 +218,14 @@ void mqtt_events_begin(mqtt_bridge_t *self) {
 }
 
 void mqtt_events_poll(mqtt_bridge_t *self) {
-    if (self->refusals.count != self->refusals.logged && self->now_us >= self->refusals.told_us) {
+    if (self->refusals.count != self->refusals.logged && self->now_us >= self->refusals.logged_us) {
         (void)fprintf(stderr,
                       "iwheel-mqtt: messages that the broker did not accept so far: %llu, events set aside: %zu, last "
                       "%s; see the broker's rights for this user and its largest packet\n",
                       (unsigned long long)self->refusals.count, self->spool.aside, self->refusals.last);
         self->refusals.logged = self->refusals.count;
         self->refusals.has_event = false;
-        self->refusals.told_us = self->now_us + REFUSED_US;
+        self->refusals.logged_us = self->now_us + REFUSED_US;
     }
     try_aside(self);
 }

@@ -18,7 +18,7 @@ static void print_line(const char *text) {
 }
 
 /// Prints the present state of the gateway and its meaning. With --json it prints nothing.
-static void tell_state(const ctl_t *self, const json_t *reply) {
+static void report_state(const ctl_t *self, const json_t *reply) {
     static const struct {
         const char *state;
         const char *meaning;
@@ -44,7 +44,7 @@ static void tell_state(const ctl_t *self, const json_t *reply) {
 /// Prints the state of the reply if there is one, releases the reply, and returns `code`.
 static int finish(ctl_t *self, int code, json_t *reply) {
     if (code == CTL_OK) {
-        tell_state(self, reply);
+        report_state(self, reply);
     }
     json_decref(reply);
     return code;

@@ -79,7 +79,7 @@ static void judge_sending(doctor_t *self) {
     }
 }
 
-static void look_at_status(doctor_t *self) {
+static void check_status(doctor_t *self) {
     inspect_findings_t *findings = &self->findings;
     const json_t *status = self->gateway.status;
     const char *state = text_word(status, "state");
@@ -115,7 +115,7 @@ void doctor_look_at_gateway(doctor_t *self) {
     const char *path = self->gateway.path;
     switch (self->gateway.result) {
     case NEAR_FOUND:
-        look_at_status(self);
+        check_status(self);
         break;
     case NEAR_OTHER:
         inspect_say(findings, "gateway", INSPECT_OK, "gateway at %s: it serves %s, not this bus", path,
@@ -168,7 +168,7 @@ static bool open_hal(doctor_t *self) {
 }
 
 /// Adds the bus state that the gateway knows from before: a controller reports error passive only when it begins.
-static void hear_gateway(doctor_t *self) {
+static void read_gateway(doctor_t *self) {
     if (!has_gateway(self)) {
         return;
     }
@@ -221,7 +221,7 @@ void doctor_look_at_bus(doctor_t *self) {
         return;
     }
     inspect_listen(&self->hal, (iw_time_us_t)self->listen_ms * IW_US_PER_MS, &self->traffic);
-    hear_gateway(self);
+    read_gateway(self);
     inspect_link(iwl_hal_link(&self->hal), &config, &self->findings);
     inspect_bus(iwl_hal_link(&self->hal), &self->traffic, &config, &self->findings);
     if (has_gateway(self) ||

@@ -89,7 +89,7 @@ static void say_no_can(doctor_t *self) {
     }
 }
 
-static bool look_at_kernel(doctor_t *self) {
+static bool check_kernel(doctor_t *self) {
     char driver[64];
     const int probe = socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC, CAN_RAW);
     if (probe < 0) {
@@ -122,7 +122,7 @@ static int64_t worst_lateness_us(void) {
     return worst_us;
 }
 
-static void look_at_clock(doctor_t *self) {
+static void check_clock(doctor_t *self) {
     struct timespec resolution = {0, 0};
     struct timex state = {.modes = 0};
     inspect_findings_t *findings = &self->findings;
@@ -147,7 +147,7 @@ static void look_at_clock(doctor_t *self) {
 }
 
 /// Checks whether this user may use the gateway's socket, by the group of the service.
-static void look_at_rights(doctor_t *self) {
+static void check_rights(doctor_t *self) {
     static const char group_name[] = "iwheel";
     gid_t groups[256];
     const struct group *group = getgrnam(group_name);
@@ -169,8 +169,8 @@ static void look_at_rights(doctor_t *self) {
 }
 
 bool doctor_look_at_machine(doctor_t *self) {
-    const bool able = (self->bus != NULL && is_local(self->bus)) || look_at_kernel(self);
-    look_at_clock(self);
-    look_at_rights(self);
+    const bool able = (self->bus != NULL && is_local(self->bus)) || check_kernel(self);
+    check_clock(self);
+    check_rights(self);
     return able;
 }

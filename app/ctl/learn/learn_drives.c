@@ -15,7 +15,7 @@ void learn_drives_init(learn_drives_t *self, const iw_config_t *config) {
     self->config = config;
     iw_diverge_init(&self->pair, config);
     for (size_t side = 0; side < IW_SIDES; side++) {
-        self->received_us[side] = self->told_us[side] = -1;
+        self->received_us[side] = self->setpoint_us[side] = -1;
         learn_lag_init(&self->lag[side]);
     }
 }
@@ -33,8 +33,8 @@ static bool is_recent(int64_t then_us, int64_t now_us, int64_t span_us) {
 }
 
 static bool has_ended(const learn_drives_t *self, int64_t now_us) {
-    const bool values =
-        is_recent(self->told_us[IW_LEFT], now_us, ENDED_US) || is_recent(self->told_us[IW_RIGHT], now_us, ENDED_US);
+    const bool values = is_recent(self->setpoint_us[IW_LEFT], now_us, ENDED_US) ||
+                        is_recent(self->setpoint_us[IW_RIGHT], now_us, ENDED_US);
     return !values || !is_recent(self->moved_us, now_us, ENDED_US);
 }
 
@@ -43,7 +43,7 @@ static void compare(learn_drives_t *self, int64_t now_us) {
     bool known = true;
     for (size_t side = 0; side < IW_SIDES; side++) {
         known = known && is_recent(self->received_us[side], now_us, HEARD_US) &&
-                is_recent(self->told_us[side], now_us, ENDED_US);
+                is_recent(self->setpoint_us[side], now_us, ENDED_US);
     }
     if (!known || !self->compared) {
         iw_diverge_restart(&self->pair, (iw_time_us_t)now_us);
@@ -63,7 +63,7 @@ static void compare(learn_drives_t *self, int64_t now_us) {
 /// Notes a setpoint. `applied_mm_s` is in the machine's sense of direction, as measured speeds are.
 static void note_setpoint(learn_drives_t *self, size_t side, int32_t speed_mm_s, int64_t now_us) {
     self->pair.applied_mm_s[side] = self->config->invert[side] ? -speed_mm_s : speed_mm_s;
-    self->told_us[side] = now_us;
+    self->setpoint_us[side] = now_us;
     learn_lag_tell(&self->lag[side], now_us, speed_mm_s);
     if (speed_mm_s == 0) {
         return;

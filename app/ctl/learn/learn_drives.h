@@ -24,7 +24,7 @@ typedef struct {
     const iw_config_t *config;
     iw_diverge_t pair;
     int64_t received_us[IW_SIDES]; ///< Time of its last speed frame; -1: none.
-    int64_t told_us[IW_SIDES];     ///< Time of its last setpoint; -1: none.
+    int64_t setpoint_us[IW_SIDES]; ///< Time of its last setpoint; -1: none.
     int64_t last_us;               ///< Time of the last frame.
     int64_t moved_us;              ///< Time of the last setpoint with a speed.
     bool driving;

@@ -167,7 +167,7 @@ typedef struct {
     unsigned signals;
 } source_t;
 
-static int tell_unopened(const char *bus, int error) {
+static int report_unopened(const char *bus, int error) {
     if (error == ENOTSUP) {
         return ctl_fail(CTL_UNAVAILABLE,
                         "%s: libmnl was missing when this was built, so it reads the simulator's bus only (unix:PATH)",
@@ -180,7 +180,7 @@ static int tell_unopened(const char *bus, int error) {
     return ctl_fail(CTL_UNAVAILABLE, "%s: cannot be opened: %s", bus, strerror(error));
 }
 
-static int tell_down(const char *bus) {
+static int report_down(const char *bus) {
     return (strncmp(bus, "unix:", 5) == 0)
                ? ctl_fail(CTL_UNAVAILABLE, "no simulator answers on %s; start it: iwheel-sim --can %s", bus, bus)
                : ctl_fail(CTL_UNAVAILABLE,
@@ -230,9 +230,9 @@ static int record_bus(const char *bus, recorder_t *self) {
     source.signals = signals_count();
     const int error = iwl_bus_open(&source.bus, bus);
     if (error != 0) {
-        return tell_unopened(bus, error);
+        return report_unopened(bus, error);
     }
-    int code = comes_up(&source) ? CTL_OK : tell_down(bus);
+    int code = comes_up(&source) ? CTL_OK : report_down(bus);
     bool up = true;
     while (code == CTL_OK && signals_count() == source.signals && client_now_us() < self->end_us) {
         wait_a_while(&source);

@@ -107,7 +107,7 @@ json_t *source_list(ctl_t *ctl) {
     return reply;
 }
 
-static int tell_unopened(const char *path, int error) {
+static int report_unopened(const char *path, int error) {
     switch (error) {
     case ENOENT:
         return ctl_fail(CTL_DATA, "%s: the file does not exist; record one: iwheelctl record FILE", path);
@@ -136,17 +136,17 @@ int recording_open(recording_t *self, ctl_t *ctl, const char *path) {
     self->interface[0] = '\0';
     self->fd = standard ? STDIN_FILENO : source_open(ctl, path, SOURCE_WHOLE);
     if (self->fd < 0) {
-        return tell_unopened(path, errno);
+        return report_unopened(path, errno);
     }
     if (fstat(self->fd, &status) == 0 && S_ISDIR(status.st_mode)) {
         (void)close(self->fd);
-        return tell_unopened(self->name, EISDIR);
+        return report_unopened(self->name, EISDIR);
     }
     candump_reader_init(&self->reader, self->fd);
     return CTL_OK;
 }
 
-static void tell_bad(recording_t *self) {
+static void report_bad(recording_t *self) {
     self->bad++;
     if (self->bad <= RECORDING_TOLD_MAX) {
         (void)ctl_fail(CTL_DATA, "%s:%" PRIu64 ": %s", self->name, self->reader.line, self->reader.why);
@@ -187,7 +187,7 @@ static bool read_frame(recording_t *self, candump_t *out_frame) {
             }
             break;
         case CANDUMP_READ_BAD:
-            tell_bad(self);
+            report_bad(self);
             break;
         case CANDUMP_READ_FOREIGN:
             self->refused = true;

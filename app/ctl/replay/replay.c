@@ -329,7 +329,7 @@ static iw_time_us_t ramp_us(const iw_config_t *config, const blackbox_drive_t *d
     return (iw_time_us_t)commanded * 1000000U / config->accel_mm_s2;
 }
 
-static void keep_driving(replay_t *self, const blackbox_entry_t *state, iw_time_us_t at_us) {
+static void continue_driving(replay_t *self, const blackbox_entry_t *state, iw_time_us_t at_us) {
     const iw_config_t *config = replay_look(self).config;
     iw_drive_t wanted = {.has_current = config->current_role == IW_ROLE_SETPOINT};
     iw_applied_t applied;
@@ -353,7 +353,7 @@ static void drive_up(replay_t *self, const blackbox_entry_t *state, iw_time_us_t
             (void)iw_gateway_arm(&self->gateway, at_us, state->number, false);
         }
         if (iw_gateway_state(&self->gateway) == IW_STATE_ARMED) {
-            keep_driving(self, state, at_us);
+            continue_driving(self, state, at_us);
         }
     }
 }

@@ -109,7 +109,7 @@ static void report_causes(replay_t *self, uint32_t present) {
     self->present = present;
 }
 
-static void tell_stop(replay_t *self, const iw_stop_t *stop) {
+static void report_stop(replay_t *self, const iw_stop_t *stop) {
     char sentence[IWN_SENTENCE_SIZE];
     char client[32];
     if (stop->number == self->stop_number) {
@@ -131,7 +131,7 @@ static void report_arming(replay_t *self, const iw_snapshot_t *seen) {
     self->arming = seen->arming;
 }
 
-static void tell_state(replay_t *self, iw_state_t state) {
+static void report_state(replay_t *self, iw_state_t state) {
     if (state != self->state) {
         report(self, self->now_us, "state", "%s", iwn_state_name(state));
         self->state = state;
@@ -144,9 +144,9 @@ void replay_report_step(replay_t *self) {
     report_wheels(self, &seen);
     tell_assumptions(self, &seen);
     report_causes(self, seen.present);
-    tell_stop(self, seen.stop);
+    report_stop(self, seen.stop);
     report_arming(self, &seen);
-    tell_state(self, seen.state);
+    report_state(self, seen.state);
 }
 
 static void report_drive(replay_t *self, const blackbox_entry_t *entry, const char *result) {

@@ -68,7 +68,7 @@ static void draw_lease(const paper_t *paper, const json_t *lease) {
 }
 
 /// Returns the time when a real button was last tested; "" if the gateway does not report it.
-static const char *tell_tried(const json_t *estop, char *out_text, size_t size) {
+static const char *report_tried(const json_t *estop, char *out_text, size_t size) {
     const json_t *tried = json_object_get(estop, "tried_wall_us");
     char when[TEXT_CELL] = "never";
     if (json_is_integer(tried)) {
@@ -79,7 +79,7 @@ static const char *tell_tried(const json_t *estop, char *out_text, size_t size) 
 }
 
 /// Returns the second line of the e-stop, and which contact is pressed; "" with one contact.
-static const char *tell_second(const json_t *estop, char *out_text, size_t size) {
+static const char *report_second(const json_t *estop, char *out_text, size_t size) {
     const char *line2 = json_string_value(get(estop, "line2"));
     const char *where = text_word(estop, "pressed_at");
     (void)snprintf(out_text, size, ", line2 %.128s%s%.16s", (line2 != NULL) ? line2 : "",
@@ -99,8 +99,9 @@ static void draw_surroundings(const paper_t *paper, const json_t *status) {
     paper_wrap(paper, "BUS", is(text_word(bus, "state"), "active") ? TONE_GOOD : TONE_BAD, text);
     const bool simulated = json_is_true(get(estop, "simulated"));
     (void)snprintf(text, sizeof text, "%.32s%s, line %.128s%s%s", is(button, "none") ? "NONE" : button,
-                   simulated ? " (SIMULATED)" : "", text_word(estop, "line"), tell_second(estop, second, sizeof second),
-                   (simulated || is(button, "none")) ? "" : tell_tried(estop, tried, sizeof tried));
+                   simulated ? " (SIMULATED)" : "", text_word(estop, "line"),
+                   report_second(estop, second, sizeof second),
+                   (simulated || is(button, "none")) ? "" : report_tried(estop, tried, sizeof tried));
     paper_wrap(paper, "E-STOP", is(button, "released") ? TONE_GOOD : TONE_BAD, text);
 }
 

@@ -56,7 +56,7 @@ static near_t choose(const ctl_t *ctl, const char *bus, char *out_path, size_t s
     }
 }
 
-static int tell_denied(const char *path) {
+static int report_denied(const char *path) {
     struct stat status;
     const struct group *group = (stat(path, &status) == 0) ? getgrgid(status.st_gid) : NULL;
     if (group == NULL) {
@@ -67,24 +67,24 @@ static int tell_denied(const char *path) {
                     group->gr_name, group->gr_name);
 }
 
-static int tell_refusal(const char *error, const char *message) {
+static int report_refusal(const char *error, const char *message) {
     return ctl_fail(CTL_NO, "refused (%s): %s", (error != NULL) ? error : "no reason",
                     (message != NULL) ? message : "no message");
 }
 
 int ctl_refused(const json_t *reply) {
-    return tell_refusal(json_string_value(json_object_get(reply, "error")),
-                        json_string_value(json_object_get(reply, "message")));
+    return report_refusal(json_string_value(json_object_get(reply, "error")),
+                          json_string_value(json_object_get(reply, "message")));
 }
 
 /// Reports why there is no connection: the error of the system, or otherwise that of the gateway.
-static int tell_unopened(const ctl_t *self, const char *path, iwc_result_t result) {
+static int report_unopened(const ctl_t *self, const char *path, iwc_result_t result) {
     switch (iwc_errno(self->client.gateway)) {
     case 0:
         break;
     case EACCES:
     case EPERM:
-        return tell_denied(path);
+        return report_denied(path);
     case ENOENT:
         return ctl_fail(CTL_UNAVAILABLE, "%s does not exist; %s", path, START_HINT);
     case ECONNREFUSED:
@@ -99,7 +99,7 @@ static int tell_unopened(const ctl_t *self, const char *path, iwc_result_t resul
                         strerror(iwc_errno(self->client.gateway)), START_HINT);
     }
     if (result == IWC_REFUSED) {
-        return tell_refusal(iwc_error(self->client.gateway), iwc_reason(self->client.gateway));
+        return report_refusal(iwc_error(self->client.gateway), iwc_reason(self->client.gateway));
     }
     return ctl_lost(result);
 }
@@ -151,7 +151,7 @@ static int connect_to_one(ctl_t *self) {
     const char *path = (self->socket != NULL) ? self->socket : found;
     const iwc_result_t result = client_open(&self->client, path, client_now_us() + CLIENT_REPLY_US);
     if (result != IWC_OK) {
-        return tell_unopened(self, path, result);
+        return report_unopened(self, path, result);
     }
     if (iwc_watches_only(self->client.gateway)) {
         (void)ctl_fail(CTL_OK, "%s allows watch, stop and estop, but not drive", path);
@@ -200,7 +200,7 @@ int ctl_stop(ctl_t *self, const ctl_stop_t *stop, json_t **out_reply) {
     const char *path = (self->socket != NULL) ? self->socket : found;
     const iwc_result_t result = stop_anyhow(self, path, stop);
     if ((result != IWC_OK && result != IWC_REFUSED) || !iwc_reply(self->client.gateway, &reply)) {
-        return tell_unopened(self, path, result);
+        return report_unopened(self, path, result);
     }
     self->client.line = reply.text;
     *out_reply = json_loadb(reply.text, reply.length, JSON_REJECT_DUPLICATES, NULL);

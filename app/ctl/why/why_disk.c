@@ -18,7 +18,7 @@
 #define EVENTS    ".jsonl"
 #define FRAMES    ".log"
 
-static int tell_closed_directory(const char *directory, int error) {
+static int report_closed_directory(const char *directory, int error) {
     switch (error) {
     case ENOENT:
     case ENOTDIR:
@@ -59,7 +59,7 @@ static bool names_on_disk(json_t *names, const char *directory) {
     return count >= 0;
 }
 
-static bool names_told(json_t *names, ctl_t *ctl) {
+static bool names_of_gateway(json_t *names, ctl_t *ctl) {
     json_t *reply = source_list(ctl);
     size_t i = 0;
     const json_t *entry = NULL;
@@ -77,7 +77,7 @@ static bool names_told(json_t *names, ctl_t *ctl) {
 /// another machine, with recordings of its own. Returns NULL, with errno, on failure.
 static json_t *find_names(const why_disk_t *where) {
     json_t *names = json_array();
-    if ((where->ctl != NULL && names_told(names, where->ctl)) || names_on_disk(names, where->directory)) {
+    if ((where->ctl != NULL && names_of_gateway(names, where->ctl)) || names_on_disk(names, where->directory)) {
         return names;
     }
     json_decref(names);
@@ -118,7 +118,7 @@ int why_disk_list(const why_disk_t *self) {
     size_t i = 0;
     const json_t *name = NULL;
     if (names == NULL) {
-        return tell_closed_directory(self->directory, errno);
+        return report_closed_directory(self->directory, errno);
     }
     json_array_foreach(names, i, name) {
         list_one(self, json_string_value(name));

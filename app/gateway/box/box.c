@@ -215,7 +215,7 @@ void gw_record_write_request(const gw_box_t *box, iwn_out_t *json) {
     iwn_out_int(json, "most_bytes", (int64_t)GW_BOX_REQUEST_BYTES);
 }
 
-static void tell_request(const gw_box_request_t *request, sock_log_t *log) {
+static void report_request(const gw_box_request_t *request, sock_log_t *log) {
     if (request->ended == GW_BOX_BY_FAULT) {
         sock_log(log, SOCK_LOG_WARNING, "the recording on request has ended: %s; %s", sock_folder_fault(request->error),
                  sock_folder_fix(request->error));
@@ -226,7 +226,7 @@ static void tell_request(const gw_box_request_t *request, sock_log_t *log) {
     }
 }
 
-static void tell_result(const gw_box_t *box, sock_log_t *log) {
+static void report_result(const gw_box_t *box, sock_log_t *log) {
     const gw_box_result_t *result = &box->last;
     const char *directory = box->config.directory;
     if (result->number == 0U && result->error == 0) {
@@ -251,9 +251,9 @@ void gw_record_take(gw_box_t *box, sock_log_t *log) {
     switch (gw_box_take(box)) {
     case GW_CHILD_SAID:
         if (box->news == GW_BOX_STOP) {
-            tell_result(box, log);
+            report_result(box, log);
         } else {
-            tell_request(&box->request, log);
+            report_request(&box->request, log);
         }
         break;
     case GW_CHILD_ENDED:

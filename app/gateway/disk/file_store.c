@@ -54,7 +54,7 @@ static int read_whole(int fd, char *text, size_t *out_length) {
     return (count < 0) ? errno : 0;
 }
 
-static void tell_file(work_t *work) {
+static void send_file(work_t *work) {
     size_t length = 0;
     const int directory = sock_folder_open_own(work->directory);
     if (directory < 0) {
@@ -127,7 +127,7 @@ static void serve(int fd, const void *context) {
     work = (work_t){.directory = self->directory, .name = self->name, .fd = fd};
     (void)snprintf(work.fresh, sizeof work.fresh, "%s.new", work.name);
     (void)snprintf(work.damaged, sizeof work.damaged, "%s.damaged", work.name);
-    tell_file(&work);
+    send_file(&work);
     do {
         length = recv(fd, work.message, sizeof work.message, 0);
         if (length > 0) {

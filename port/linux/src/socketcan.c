@@ -122,7 +122,7 @@ static void try_up(socketcan_t *can) {
 }
 
 /// While up: checks by the carrier whether the controller is bus-off.
-static void look_at_carrier(socketcan_t *can) {
+static void check_carrier(socketcan_t *can) {
     const int carrier = iwl_netdev_carrier(can->name);
     if (carrier == 0) {
         iwl_bus_note(&can->bus, IW_BUS_OFF);
@@ -212,7 +212,7 @@ static void can_poll(iwl_bus_t *bus) {
         }
     }
     if (bus->up && bus->now_us >= bus->look_us) {
-        look_at_carrier(can);
+        check_carrier(can);
     }
     (void)iwl_bus_load_take(&bus->load, bus->now_us, bus->link.bitrate_hz, &bus->link.load_permille);
 }
