@@ -312,7 +312,7 @@ class AsyncGateway:
             pass
         return bytes(data)
 
-    async def record(self, on: bool) -> OnRequest:
+    async def record_on_request(self, on: bool) -> OnRequest:
         return cast(OnRequest, without_envelope(await self._ask("record", on=bool(on))))
 
     async def watch(self, *topics: str, rate_hz: Whole | None = None) -> Watched:

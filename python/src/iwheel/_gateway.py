@@ -102,7 +102,7 @@ class Gateway:
             pass
         return bytes(data)
 
-    def record(self, on: bool) -> OnRequest:
+    def record_on_request(self, on: bool) -> OnRequest:
         """Begins or ends the recording on request on the gateway's disk. It moves nothing."""
         return cast(OnRequest, without_envelope(self._ask("record", on=bool(on))))
 

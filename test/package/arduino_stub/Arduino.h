@@ -8,7 +8,9 @@
 
 struct SerialStub {
     void begin(unsigned long) {}
-    void println(const char *text) { (void)puts(text); }
+    void println(const char *text) {
+        (void)puts(text);
+    }
 };
 static SerialStub Serial;
 
