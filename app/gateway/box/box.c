@@ -218,7 +218,7 @@ void gw_record_write_request(const gw_box_t *box, iwn_out_t *json) {
 static void tell_request(const gw_box_request_t *request, sock_log_t *log) {
     if (request->ended == GW_BOX_BY_FAULT) {
         sock_log(log, SOCK_LOG_WARNING, "the recording on request has ended: %s; %s", sock_folder_fault(request->error),
-                 sock_folder_cure(request->error));
+                 sock_folder_fix(request->error));
     } else if (request->ended == GW_BOX_RUNS) {
         sock_log(log, SOCK_LOG_INFO, "recording on request to %s", request->name);
     } else {
