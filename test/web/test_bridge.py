@@ -1272,7 +1272,7 @@ def test_record_on_request_writes_until_it_is_ended(rig):
     def listed(on):
         found = rig.ask_json("GET", "/api/recordings")[1]
         entry = [one for one in found["recordings"] if one["cause"] == "requested"]
-        return found["on_request"]["on"] is on and bool(found["on_request"]["ended"]) is not on and entry and entry[0]["log_bytes"] > 10_000 and entry[0]
+        return found["on_request"]["on"] is on and bool(found["on_request"]["ended"]) is not on and entry and (entry[0]["log_bytes"] or 0) > 10_000 and entry[0]
 
     name = until(lambda: listed(True), 5, "frames are on the disk")["name"]
     assert rig.ask_json("POST", "/api/record?on=false")[1]["on"] is False
