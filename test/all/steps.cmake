@@ -110,7 +110,7 @@ test(real kilted ci foreign default "${B}/app/bridge/ros2/iwheel-ros2 py:cyclone
 test(idle mqtt.hours check+full safety default ${B}/app/bridge/mqtt/iwheel-mqtt 10 ${B}/test/mqtt/mqtt_hours)
 test(real mqtt check+full realtime default "${B}/app/bridge/mqtt/iwheel-mqtt py:paho.mqtt py:pytest mosquitto openssl" 94 ${PYTEST} test/mqtt --build ${B} --jobs 3)
 test(idle serial check+full scenario "default;kernel.build" py:pytest 60 ${PYTEST} test/serial/test_wires.py --build ${B} --virtual --jobs ${JOBS})
-test(real serial.realtime check+full realtime default py:pytest 15 ${PYTEST} test/serial/test_wires.py --build ${B} --jobs 4 -m native)
+test(real serial.realtime check+full realtime default py:pytest 10 ${PYTEST} test/serial/test_wires.py --build ${B} --jobs 4 -m native)
 test(real serial.image check+full target default "py:pytest py:unicorn arm-none-eabi-gcc" 40 ${PYTEST} test/serial/test_image.py --build ${B})
 test(real web check+full realtime default "${B}/app/bridge/web/iwheel-web py:pytest" 69 ${PYTEST} test/web --build ${B})
 test(idle cross.packages ci packaging default "" 78 test/cross/run --build)
