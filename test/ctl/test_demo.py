@@ -138,7 +138,7 @@ class Others(unittest.TestCase):
             one.bind(("127.0.0.1", 0))
             self.port = one.getsockname()[1]
             next_one.bind(("127.0.0.1", 0))
-            self.taken = next_one.getsockname()[1]
+            self.busy_port = next_one.getsockname()[1]
 
     def start(self, name, *words):
         process = subprocess.Popen(
@@ -179,13 +179,13 @@ class Others(unittest.TestCase):
 
     def test_port_in_use_is_named_with_its_fix(self):
         with socket.socket() as one:
-            one.bind(("127.0.0.1", self.taken))
+            one.bind(("127.0.0.1", self.busy_port))
             one.listen()
             for name, option in (("web.py", "--web"), ("fleet.py", "--fleet")):
-                process = self.start(name, "--port", str(self.taken))
+                process = self.start(name, "--port", str(self.busy_port))
                 said = process.communicate(timeout=20)[0]
                 self.assertEqual(process.returncode, 1, said)
-                self.assertIn(f"port {self.taken} is not free", said)
+                self.assertIn(f"port {self.busy_port} is not free", said)
                 self.assertIn(f"./demo {option} --port N", said)
         self.assertEqual([], os.listdir(self.folder))
 

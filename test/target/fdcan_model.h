@@ -19,14 +19,14 @@ typedef struct {
     uint32_t cccr, nbtp, ir, ie, ils, ile, rxgfc, xidam, txbc, txbto, txbcf, txbtie, txbcie, ckdiv;
     uint32_t ram[FDCAN_MODEL_RAM_WORDS];
     uint32_t lec, tec, rec;
-    uint32_t pending;                      ///< Of each buffer a bit: TXBRP and TXBAR.
-    uint32_t unnoticed;                    ///< Of these, the requests that the controller has not noticed: TXBAR.
-    uint32_t cancelled;                    ///< Of these, those whose cancellation is requested.
-    uint32_t on_bus;                       ///< Of these, the one that is being transmitted.
+    uint32_t pending;                      ///< A bit per buffer: TXBRP and TXBAR.
+    uint32_t unnoticed;                    ///< Pending requests that the controller has not noticed: TXBAR.
+    uint32_t cancelled;                    ///< Pending requests whose cancellation is requested.
+    uint32_t on_bus;                       ///< Pending request that is being transmitted.
     uint32_t delayed[FDCAN_MODEL_BUFFERS]; ///< Reads of TXBRP until a cancellation takes effect.
     uint32_t order[FDCAN_MODEL_BUFFERS];   ///< Requests are numbered, for the mode without a queue.
     uint32_t requests, put;
-    uint32_t get, level; ///< Of FIFO 0.
+    uint32_t get, level; ///< Get index and fill level of FIFO 0.
     bool lost;           ///< A frame found FIFO 0 full.
     uint32_t held_bits, recessive_bits, recovered;
     bool joining, bus_off, passive, exception;

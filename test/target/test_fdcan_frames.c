@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What FDCAN does and bxCAN does not: FD frames, requests with one write, the configuration that must not depend on earlier values.
+// Features of FDCAN that bxCAN does not have: FD frames, requests with one write, the configuration that must not depend on earlier values.
 #include "can_rig.h"
 #include "unit.h"
 
@@ -63,12 +63,12 @@ TEST(test_fd_frame_before_a_send_is_counted) {
 
 TEST(test_stored_fd_frame_is_no_classic_frame) {
     const model_frame_t frame = {.id = 266, .dlc = 5};
-    iw_can_frame_t taken;
+    iw_can_frame_t received;
     (void)can_model_receive(model, &frame);
     model->ram[44U + 1U] |= BRD_ELEMENT_FDF;
     rig_serve(0);
-    TEST_ASSERT_EQUAL(1, can_receive(driver, &taken));
-    TEST_ASSERT_EQUAL_HEX32(266U | IW_CAN_FD, taken.id);
+    TEST_ASSERT_EQUAL(1, can_receive(driver, &received));
+    TEST_ASSERT_EQUAL_HEX32(266U | IW_CAN_FD, received.id);
 }
 
 TEST(test_controller_is_in_classic_mode_with_a_queue) {
@@ -177,17 +177,17 @@ TEST(test_values_from_before_do_not_matter) {
 }
 
 TEST(test_full_fifo_retains_the_older_frames) {
-    iw_can_frame_t taken;
+    iw_can_frame_t received;
     for (uint8_t i = 0; i < 4; i++) {
         const model_frame_t frame = {.id = 256, .dlc = 1, .data = {i}};
         (void)can_model_receive(model, &frame);
     }
     rig_serve(0);
-    TEST_ASSERT_EQUAL(1, can_receive(driver, &taken));
-    TEST_ASSERT_EQUAL_HEX32(IW_CAN_ERROR, taken.id);
+    TEST_ASSERT_EQUAL(1, can_receive(driver, &received));
+    TEST_ASSERT_EQUAL_HEX32(IW_CAN_ERROR, received.id);
     for (uint8_t i = 0; i < 3; i++) {
-        TEST_ASSERT_EQUAL(1, can_receive(driver, &taken));
-        TEST_ASSERT_EQUAL(i, taken.data[0]);
+        TEST_ASSERT_EQUAL(1, can_receive(driver, &received));
+        TEST_ASSERT_EQUAL(i, received.data[0]);
     }
-    TEST_ASSERT_EQUAL(0, can_receive(driver, &taken));
+    TEST_ASSERT_EQUAL(0, can_receive(driver, &received));
 }

@@ -26,12 +26,12 @@ void replay_samples_begin(const replay_out_t *out) {
 }
 
 void replay_samples_frame(replay_t *self, const iw_can_frame_t *frame) {
-    iw_codec_wheel_t told[IW_SIDES];
-    if (self->out.samples_us == 0U || self->quiet || iw_codec_decode(frame, told) != IW_CODEC_SETPOINT) {
+    iw_codec_wheel_t values[IW_SIDES];
+    if (self->out.samples_us == 0U || self->quiet || iw_codec_decode(frame, values) != IW_CODEC_SETPOINT) {
         return;
     }
     const iw_side_t side = iw_codec_side(frame->id);
-    const int16_t speed_mm_s = told[side].setpoint.speed_mm_s;
+    const int16_t speed_mm_s = values[side].setpoint.speed_mm_s;
     const bool mirrored = replay_look(self).config->invert[side];
     self->samples.speed_mm_s[side] = (mirrored && speed_mm_s != INT16_MIN) ? (int16_t)-speed_mm_s : speed_mm_s;
     self->samples.at_us[side] = self->now_us;
