@@ -37,14 +37,10 @@ IWN_OUT_INLINE void iwn_out_open(iwn_out_t *self, const char *name, char bracket
 }
 
 IWN_OUT_INLINE void iwn_out_known(iwn_out_t *self, const char *name, bool known, int64_t value) {
-    char *const at = iwn_out_begin(self, iwn_span(name), known ? iwn_digits_length(value) : 4U);
-    if (at == NULL) {
-        return;
-    }
-    if (known) {
+    if (!known) {
+        iwn_out_span(self, iwn_span(name), iwn_span("null"));
+    } else if (iwn_out_begin(self, iwn_span(name), iwn_digits_length(value)) != NULL) {
         (void)iwn_digits(value, &self->data[self->length]);
-    } else {
-        memcpy(at, "null", 4U);
     }
 }
 
@@ -53,12 +49,7 @@ IWN_OUT_INLINE void iwn_out_int(iwn_out_t *self, const char *name, int64_t value
 }
 
 IWN_OUT_INLINE void iwn_out_bool(iwn_out_t *self, const char *name, bool value) {
-    char *const at = iwn_out_begin(self, iwn_span(name), value ? 4U : 5U);
-    if (at != NULL && value) {
-        memcpy(at, "true", 4U);
-    } else if (at != NULL) {
-        memcpy(at, "false", 5U);
-    }
+    iwn_out_span(self, iwn_span(name), value ? iwn_span("true") : iwn_span("false"));
 }
 
 IWN_OUT_INLINE void iwn_out_null(iwn_out_t *self, const char *name) {
