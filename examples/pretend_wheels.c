@@ -22,7 +22,7 @@ void pretend_wheels_run(pretend_wheels_t *self) {
     }
 }
 
-static void receive(pretend_wheels_t *self, const iw_can_frame_t *frame) {
+static void follow(pretend_wheels_t *self, const iw_can_frame_t *frame) {
     iw_can_frame_t echo = *frame;
     iw_codec_wheel_t values[IW_SIDES];
     if (iw_codec_decode(frame, values) == IW_CODEC_SETPOINT) {
@@ -39,7 +39,7 @@ static void receive(pretend_wheels_t *self, const iw_can_frame_t *frame) {
 static int send(void *context, const iw_can_frame_t *frames, uint32_t count) {
     pretend_wheels_t *self = (pretend_wheels_t *)context;
     for (uint32_t i = 0; i < count; i++) {
-        receive(self, &frames[i]);
+        follow(self, &frames[i]);
     }
     return (int)count;
 }

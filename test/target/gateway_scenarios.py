@@ -268,6 +268,7 @@ FLOODS = {
     "release": {"cmd": "release"},
     "tare": {"cmd": "tare"},
     "confirm": {"cmd": "confirm", "item": "wheel_radius", "value": "192"},
+    "record": {"cmd": "record", "on": True},
     "recordings": {"cmd": "recordings"},
     "recording": {"cmd": "recording", "name": "20260101T000000Z-stop.iwr"},
     "reset": {"cmd": "reset"},

@@ -48,6 +48,7 @@ size_t iwn_utf8(uint32_t code_point, char out_bytes[4]);
 /// Writes the decimal digits of a number so that they end at `end`; 20 bytes before it must be writable. Returns their
 /// beginning.
 char *iwn_digits(int64_t number, char *end);
+/// Does the same with a number of 64 bits without a sign.
 char *iwn_digits_unsigned(uint64_t number, char *end);
 #define IWN_DIGITS_MAX 20U ///< Bytes of the longest number, with its sign.
 
@@ -69,6 +70,7 @@ void iwn_text_span(iwn_text_t *self, const char *text, size_t length);
 void iwn_text_add(iwn_text_t *self, const char *text);
 /// Appends decimal digits.
 void iwn_text_int(iwn_text_t *self, int64_t number);
+/// Appends decimal digits of a number of 64 bits without a sign.
 void iwn_text_unsigned(iwn_text_t *self, uint64_t number);
 /// Appends this number of hexadecimal digits, upper case.
 void iwn_text_hex(iwn_text_t *self, uint32_t number, unsigned digits);
