@@ -195,8 +195,13 @@ void brd_host_init(brd_host_t *self, const brd_host_place_t *place, iw_time_us_t
     brd_host_report_link(self);
 }
 
-bool brd_host_wants_restart(const brd_host_t *self) {
-    return self->restart_us != 0U && (brd_serial_is_idle() || self->server.now_us >= self->restart_us);
+bool brd_host_wants_restart(brd_host_t *self) {
+    const iw_time_us_t now_us = self->server.now_us;
+    if (!brd_serial_is_idle()) {
+        self->unsent_us = now_us;
+    }
+    return self->restart_us != 0U &&
+           (now_us - self->unsent_us >= BRD_HOST_LAST_BYTES_US || now_us >= self->restart_us);
 }
 
 bool brd_host_receive(brd_host_t *self, iw_time_us_t now_us) {

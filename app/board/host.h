@@ -39,6 +39,8 @@
 #define BRD_HOST_ERROR_US 200000U
 /// A restart after a commit waits until its reply has left, but not longer than this.
 #define BRD_HOST_RESTART_US 500000U
+/// Time in which the serial port sends the last bytes that it has, more than two at 115200 baud.
+#define BRD_HOST_LAST_BYTES_US 1000U
 
 /// A client of the relay.
 typedef struct {
@@ -91,6 +93,7 @@ typedef struct {
     iw_time_us_t error_us;    ///< Time of the last line_error.
     iw_time_us_t learn_us;    ///< Earliest time at which learned facts are written.
     iw_time_us_t restart_us;  ///< Latest time of the restart after a commit; 0: no restart.
+    iw_time_us_t unsent_us;   ///< Last time at which bytes waited to be sent.
     brd_fault_t last_fault;   ///< As in brd_host_place_t.
     uint32_t errors;          ///< Bad lines since the start.
     uint32_t errors_told;     ///< Bad lines that a line_error has counted.
@@ -163,8 +166,8 @@ bool brd_host_write_assumptions(const brd_assumptions_t *learned);
 /// CPU writes to flash.
 bool brd_host_is_silent(const brd_host_t *self);
 
-/// Returns true when the board must restart.
-bool brd_host_wants_restart(const brd_host_t *self);
+/// Returns true when the board must restart. Call it after each step.
+bool brd_host_wants_restart(brd_host_t *self);
 
 void brd_host_config(brd_host_t *self, iwn_client_t *client);
 /// Executes `confirm`: the operator confirms or contradicts an assumption.

@@ -8,7 +8,6 @@
 #include <string.h>
 
 #define ERRORS (7U << 1) // SR: framing, noise, overrun.
-#define TC     (1U << 6)
 #define RE     (1U << 2) // CR1
 #define TE     (1U << 3)
 #define IDLEIE (1U << 4)
@@ -97,7 +96,7 @@ bool brd_serial_lends(void) {
 }
 
 bool brd_serial_is_idle(void) {
-    return put == sent && lent == NULL && !brd_serial_dma_sends() && (BRD_USART2->SR & TC) != 0U;
+    return put == sent && lent == NULL && !brd_serial_dma_sends();
 }
 
 /// Marks the bytes as sent that the DMA has passed to the USART.
@@ -125,7 +124,6 @@ void brd_serial_step(void) {
         from = &waiting[sent % BRD_SERIAL_SEND_BYTES];
     }
     if (length > 0U) {
-        brd_usart_clear_complete(); // 27.3.13: the DMA does not clear TC, which would still show the last run's end.
         brd_serial_dma_send(&BRD_USART2->BRD_USART_TDR, from, length);
     }
 }

@@ -29,7 +29,8 @@ typedef struct {
 #define MEMORY_NEXT (1U << 7)
 #define HIGH        (2U << 12) // Priority: a received byte that waits too long is lost, a byte to send is not.
 
-#define ALL_FLAGS (0xFFU << 20) // 13.4.2: channels 6 and 7, four bits each.
+#define ALL_FLAGS  (0xFFU << 20) // 13.4.2: channels 6 and 7, four bits each.
+#define SEND_FLAGS (0xFU << 24)
 
 /// Connects USART2 with both channels, where the chip has a multiplexer for it.
 static void connect(void) {
@@ -64,6 +65,7 @@ uint32_t brd_serial_dma_left(void) {
 /// 13.3.3: the count can be written only while the channel is off.
 void brd_serial_dma_send(volatile uint32_t *data_register, const char *bytes, uint32_t length) {
     TRANSMIT->CCR = 0;
+    DMA1->IFCR = SEND_FLAGS; // After a bus error the channel of an STM32G4 starts only without its flag (RM0440 12.4.7).
     TRANSMIT->CPAR = (uint32_t)(uintptr_t)data_register;
     TRANSMIT->CMAR = (uint32_t)(uintptr_t)bytes;
     TRANSMIT->CNDTR = length;

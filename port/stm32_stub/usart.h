@@ -37,15 +37,6 @@ static inline void brd_usart_clear(void) {
 #endif
 }
 
-/// Clears the end of the last transmission, TC.
-static inline void brd_usart_clear_complete(void) {
-#ifdef BRD_USART_HAS_ICR
-    BRD_USART2->ICR = 1U << 6;
-#else
-    BRD_USART2->SR = ~(1U << 6); // Writing 1 does not change a flag.
-#endif
-}
-
 /// Discards a received byte and clears the overrun of earlier ones after a read of SR.
 static inline void brd_usart_discard(void) {
     (void)BRD_USART2->BRD_USART_RDR;

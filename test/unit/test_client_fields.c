@@ -208,6 +208,13 @@ TEST(test_field_integers_must_be_whole_and_fit_64_bits) {
     }
 }
 
+TEST(test_field_name_that_begins_alike_is_another) {
+    const iwc_message_t message = message_of("{\"speeds\":1,\"speed\":2,\"spee\":3}");
+    TEST_ASSERT_EQUAL_INT64(2, iwc_integer(&message, "speed").value);
+    TEST_ASSERT_EQUAL_INT64(3, iwc_integer(&message, "spee").value);
+    TEST_ASSERT_FALSE(iwc_integer(&message, "sp").known);
+}
+
 TEST(test_field_cursor_finds_fields_in_any_order) {
     const iwc_message_t message = message_of("{\"a\":1,\"o\":{\"b\":2,\"c\":\"x\",\"b.d\":3},\"e\":true,\"a\":9}");
     iwc_cursor_t cursor = {&message, NULL};
