@@ -264,7 +264,6 @@ class Story(unittest.TestCase):
         self.rig.sim.ask("estop release")
         self.ask(me, "estop", reason="a test")
         self.wait(me, lambda _: self.ask(me, "why")["recording"] is not None)
-        self.recording_on_request(me)
         self.ask(me, "recording", name="../gateway.conf", refused="bad_value")
         name = self.ask(me, "recordings")["recordings"][-1]["name"]
         self.ask(me, "recording", name=f"{name}.log")
@@ -275,6 +274,7 @@ class Story(unittest.TestCase):
         self.ask(me, "recordings")
         self.ask(me, "recording", name=f"{name}.conf")
         self.ask(me, "recording", name=f"{name}.conf", offset=-1, refused="out_of_range")
+        self.recording_on_request(me)
         self.wait_granted(me, "reset")
         self.wait_granted(me, "release")
         self.wait_granted(me, "arm")
