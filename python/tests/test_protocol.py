@@ -289,6 +289,7 @@ class Story(unittest.TestCase):
         self.wait_rest(me)
 
     def recording_on_request(self, me):
+        self.ask(me, "recordings")  # There is none yet.
         self.ask(me, "record", on=True)
         self.wait(me, lambda _: self.ask(me, "recordings")["on_request"]["name"] is not None)
         self.ask(me, "record", on=True)  # It runs already.

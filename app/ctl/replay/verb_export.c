@@ -34,6 +34,6 @@ int verb_export(ctl_t *self, int count, char **words) {
     memcpy((void *)&all[3], (const void *)words, (size_t)count * sizeof *all);
     (void)execvp(python, all);
     free((void *)all);
-    return ctl_fail(CTL_UNAVAILABLE, "python3 cannot be started (%s); install it: apt-get install python3-iwheel",
+    return ctl_fail(CTL_UNAVAILABLE, "python3 cannot be started (%s); install it: apt-get install python3",
                     strerror(errno));
 }
