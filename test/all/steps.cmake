@@ -26,7 +26,7 @@ set(S build/sanitize)
 build(sanitize.build ci sanitize "" 103)
 tests(sanitize ci unit sanitize 40)
 # These run natively: no sanitizer works in the kernel of the tests. More processes than processors would stall each other.
-test(real sanitize.ctl ci realtime sanitize py:pytest 400 ${PYTEST} test/ctl --build ${S} --jobs ${JOBS})
+test(real sanitize.ctl ci realtime sanitize py:pytest 240 ${PYTEST} test/ctl --build ${S} --jobs 4)
 test(real sanitize.client ci realtime sanitize py:pytest 22 ${PYTEST} test/client --build ${S})
 test(real sanitize.web ci realtime sanitize "${S}/app/bridge/web/iwheel-web py:pytest" 60 ${PYTEST} test/web --build ${S} -k "token_missing or token_over or paths or with_a_body or leave_room or unix_socket or killed_is or page_drives or slow_conn")
 test(idle sanitize.ros2_hours ci safety sanitize "${S}/app/bridge/ros2/iwheel-ros2" 10 ${S}/test/ros2/ros2_hours 0.05)
