@@ -31,6 +31,7 @@ def stands(rig):
 
 @pytest.mark.rig(driving=True)
 @pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.exact
 def test_firefox_first_screen_has_state_and_figures(rig, scheme):
     rig.start().connected()
     rig.sim.ask("estop press")

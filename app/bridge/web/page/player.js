@@ -38,7 +38,7 @@ function stopCard(stop, isOpen) {
     frames.hidden = !frames.hidden;
     toggle.setAttribute("aria-expanded", String(!frames.hidden));
   }, { "aria-expanded": "false", "data-number": stop.number });
-  const opens = name ? [button(STRINGS.stop_open, say("recording_open_of", { name }), () => openRecording(name, ["log", "jsonl", "conf"]))] : [];
+  const opens = name ? [button(STRINGS.stop_open, say("stop_open_of", { name }), () => openRecording(name, ["log", "jsonl", "conf"]))] : [];
   if (isOpen) toggle.click();
   return element("li", {}, element("h3", { text: title }), element("p", { class: "quiet", text: when(stop.wall_us) }), element("p", { text: stop.sentence }),
     element("div", { class: "row" }, toggle, ...opens), frames);
