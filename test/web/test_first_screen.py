@@ -318,6 +318,7 @@ def test_languages_have_the_same_texts_with_the_same_gaps(rig):
 
 
 @pytest.mark.rig(driving=True)
+@pytest.mark.exact
 def test_page_in_german_browser_is_german_english_on_request(rig):
     rig.start().connected()
     rig.sim.ask("estop press")
@@ -333,10 +334,10 @@ def test_page_in_german_browser_is_german_english_on_request(rig):
     with page_of(rig, locale="fr-FR") as page:
         live(page)
         assert page.inner_text("#word") == "Latched"
-        page.select_option("#language", "de")
-        seen(page, "document.querySelector('#word')?.textContent === 'Gesperrt'")
-        page.select_option("#language", "en")
-        seen(page, "document.querySelector('#word')?.textContent === 'Latched'")
+        for language, word in (("de", "Gesperrt"), ("en", "Latched")):
+            with page.expect_navigation():  # The page loads again.
+                page.select_option("#language", language)
+            seen(page, f"document.querySelector('#word')?.textContent === '{word}'")
 
 
 # ---- plots ----------------------------------------------------------------------------------------------------------
