@@ -65,7 +65,7 @@ uint32_t brd_serial_dma_left(void) {
 /// 13.3.3: the count can be written only while the channel is off.
 void brd_serial_dma_send(volatile uint32_t *data_register, const char *bytes, uint32_t length) {
     TRANSMIT->CCR = 0;
-    DMA1->IFCR = SEND_FLAGS; // After a bus error the channel of an STM32G4 starts only without its flag (RM0440 12.4.7).
+    DMA1->IFCR = SEND_FLAGS; // After a bus error a channel of the G4 starts only without its flag (RM0440 12.4).
     TRANSMIT->CPAR = (uint32_t)(uintptr_t)data_register;
     TRANSMIT->CMAR = (uint32_t)(uintptr_t)bytes;
     TRANSMIT->CNDTR = length;
