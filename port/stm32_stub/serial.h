@@ -41,8 +41,8 @@ bool brd_serial_write(const char *bytes, size_t length);
 bool brd_serial_lend(const char *bytes, size_t length);
 bool brd_serial_lends(void);
 
-/// Returns true when the serial port has all bytes. It may still send the last two. Its flag TC does not show their end:
-/// the DMA does not clear it (RM0008 27.3.13), and it can be set again before the DMA starts.
+/// Returns true when the serial port has all bytes. It may still send the last two: its flag TC does not show the end,
+/// because the DMA does not clear it (RM0008 27.3.13), and it can be set again before the DMA starts.
 bool brd_serial_is_idle(void);
 
 /// Continues to send. Call it after every write and after each wake-up.
