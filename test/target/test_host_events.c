@@ -296,6 +296,27 @@ TEST(test_host_restarts_only_on_request) {
     TEST_ASSERT_TRUE(brd_host_wants_restart(&host));
 }
 
+TEST(test_host_restarts_1_ms_after_the_last_bytes) {
+    const iw_time_us_t begin_us = host.server.now_us;
+    host.restart_us = begin_us + 400000U;
+    serial_sends = true;
+    TEST_ASSERT_FALSE(brd_host_wants_restart(&host));
+    serial_sends = false;
+    host.server.now_us = begin_us + BRD_HOST_LAST_BYTES_US - 1U;
+    TEST_ASSERT_FALSE(brd_host_wants_restart(&host));
+    host.server.now_us++;
+    TEST_ASSERT_TRUE(brd_host_wants_restart(&host));
+}
+
+TEST(test_host_restarts_late_while_bytes_do_not_leave) {
+    serial_sends = true;
+    host.restart_us = host.server.now_us + 400000U;
+    host.server.now_us = host.restart_us - 1U;
+    TEST_ASSERT_FALSE(brd_host_wants_restart(&host));
+    host.server.now_us++;
+    TEST_ASSERT_TRUE(brd_host_wants_restart(&host));
+}
+
 TEST(test_host_line_is_stamped_every_second_while_disarmed) {
     disarm();
     pass(1000);
