@@ -18,7 +18,7 @@ void frame_add_bytes(const candump_t *frame, const char *gap, iwn_text_t *line) 
 
 void frame_add_id(const candump_t *frame, iwn_text_t *line) {
     unsigned digits = frame->extended ? 8U : 3U;
-    while (frame->id >> 4U * digits != 0U && digits < 8U) { // An error report may have more than a standard id.
+    while (digits < 8U && frame->id >> 4U * digits != 0U) { // An error report may have more than a standard id.
         digits++;
     }
     iwn_text_add(line, "0x");
