@@ -49,11 +49,18 @@ COUNTED = {
 }
 
 
+def tests():
+    """Returns [(test, list)]; a `*` in a test's name stands for a variable of steps.cmake."""
+    found = re.findall(r"^ *(?:build\(|tests\(|test\((?:idle|real) )(\S+) (quick|check|ci|full)", TESTS.read_text(), re.M)
+    return [(re.sub(r"\$\{\w+\}", "*", name), where) for name, where in found]
+
+
 def steps():
     """Returns {step: the shortest list that has all tests of the step: quick, check, ci; full only if all of them are in it}."""
     found = {}
-    for name, where in re.findall(r"^ *(?:build\(|tests\(|test\((?:idle|real) )([a-z0-9_]+)\S* (quick|check|ci|full)", TESTS.read_text(), re.M):
-        found[name] = max(found.get(name, "quick"), where, key=LISTS.index) if where != "full" or name not in found else found[name]
+    for name, where in tests():
+        step = name.split(".")[0]
+        found[step] = max(found.get(step, "quick"), where, key=LISTS.index) if where != "full" or step not in found else found[step]
     return found
 
 
@@ -68,10 +75,10 @@ def listed(command):
 
 
 def last_run(step):
-    """Returns the number of single tests in the last run of the step; None if it did not run, or skipped some."""
-    paths = [*ROOT.glob(f"build/check/{step}.counts"), *ROOT.glob(f"build/check/{step}.*.counts")]
-    counts = [list(map(int, path.read_text().split())) for path in paths]
-    return None if not (ROOT / f"build/check/{step}.counts").exists() or any(sum(one[2:]) for one in counts) else sum(map(sum, counts))
+    """Returns the number of single tests in the last run of the step; None if a test of it did not run, or skipped some."""
+    paths = [list(ROOT.glob(f"build/check/{name}.counts")) for name, where in tests() if name.split(".")[0] == step and where != "full"]
+    counts = [list(map(int, path.read_text().split())) for of_test in paths for path in of_test]
+    return sum(map(sum, counts)) if paths and all(paths) and not any(sum(one[2:]) for one in counts) else None
 
 
 def number_of(name):
