@@ -11,6 +11,7 @@ run is "not run", which is no pass. --update raises numbers and adds steps. No t
 """
 
 import csv
+import functools
 import re
 import subprocess
 import sys
@@ -64,6 +65,7 @@ def steps():
     return found
 
 
+@functools.cache
 def listed(command):
     """Returns the number of tests that the runner lists; None if a tool of the runner is missing."""
     python = ROOT / ".venv/bin/python"

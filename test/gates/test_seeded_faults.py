@@ -384,19 +384,19 @@ def python_wheels(folder, lines):
     return status, output
 
 
-def of_sizes():
+def of_script(name):
     sys.path.insert(0, str(SCRIPTS))
-    return importlib.import_module("sizes")
+    return importlib.import_module(name)
 
 
 def sizes(_, new):
-    found = [*of_sizes().differences({"permit": [2000], "core": [9000]}, new)]
+    found = [*of_script("sizes").differences({"permit": [2000], "core": [9000]}, new)]
     return len(found), "\n".join(found)
 
 
 def sizes_of_use(_, more):
     """The size of the codec linked on a Cortex-M4, and of an additional module."""
-    module, build = of_sizes(), ROOT / "build/arm"
+    module, build = of_script("sizes"), ROOT / "build/arm"
     if not [*build.rglob("libiwheel_core.a")]:
         return 77, "build/arm has no library"
     module.CPUS = {"Cortex-M4": "cortex-m4"}
@@ -438,8 +438,10 @@ def mutation(_, kind):
 
 
 def proofs(folder, change):
+    """Compares a changed table. All cases are one process: each of the ten lists of tests, which no case changes, is made once."""
     (folder / "proofs.csv").write_text(change((ROOT / "docs/developer/proofs.csv").read_text()))
-    return run(SCRIPTS / "proofs.py", folder / "proofs.csv")
+    with contextlib.redirect_stdout(io.StringIO()) as output:
+        return of_script("proofs").main([str(folder / "proofs.csv")]), output.getvalue()
 
 
 def function(body, parameters="int a"):
@@ -786,7 +788,12 @@ CASES = [
 ]
 
 
-@pytest.mark.parametrize(("gate", "tool", "name", "argument", "must_catch"), CASES, ids=[f"{case[0].__name__}: {case[2]}" for case in CASES])
+def params():
+    for case in CASES:
+        yield pytest.param(*case, id=f"{case[0].__name__}: {case[2]}", marks=[pytest.mark.together("proofs")] if case[0] is proofs else [])
+
+
+@pytest.mark.parametrize(("gate", "tool", "name", "argument", "must_catch"), [*params()])
 def test_gate(tmp_path, gate, tool, name, argument, must_catch):
     if not (importlib.util.find_spec(tool) if tool == "lizard" else shutil.which(tool)):
         pytest.skip(f"{tool} is missing")

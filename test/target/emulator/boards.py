@@ -11,6 +11,7 @@ BLOCK_SIZE = 0x400
 IRQ_EXTI0, IRQ_TRANSMIT, IRQ_RECEIVE, IRQ_ERROR = 6, 19, 20, 22
 IRQ_SERIAL_RECEIVE, IRQ_SERIAL_TRANSMIT, IRQ_SERIAL = 16, 17, 38
 IRQ_FDCAN = 21
+SERIAL = 3 | 1 << IRQ_SERIAL - IRQ_SERIAL_RECEIVE
 NO_DEVICE = None, (None, 0), None, None  # Its clock is never on.
 
 
@@ -83,13 +84,11 @@ class Board:
 
     def interrupts(self, machine):
         """The interrupts whose lines are up, each a bit."""
-        return (
-            self.can_interrupts(machine.can.lines())
-            | machine.exti.line() << IRQ_EXTI0
-            | machine.dma.receive.line() << IRQ_SERIAL_RECEIVE
-            | machine.dma.transmit.line() << IRQ_SERIAL_TRANSMIT
-            | machine.uart.line() << IRQ_SERIAL
-        )
+        lines = self.can_interrupts(machine.can.lines()) | machine.exti.line() << IRQ_EXTI0
+        if not machine.enabled >> IRQ_SERIAL_RECEIVE & SERIAL:
+            return lines
+        dma = machine.dma
+        return lines | dma.receive.line() << IRQ_SERIAL_RECEIVE | dma.transmit.line() << IRQ_SERIAL_TRANSMIT | machine.uart.line() << IRQ_SERIAL
 
     def can_interrupts(self, lines):
         return (lines & 1) << IRQ_TRANSMIT | (lines >> 1 & 1) << IRQ_RECEIVE | (lines >> 2 & 1) << IRQ_ERROR
@@ -144,21 +143,23 @@ class Board:
 
     remap_offset = None
 
-    def may_access(self, name, clock, address):
-        """A device is there, and its clock is on."""
-        if clock is None or self.machine.clocks.is_enabled(*clock):
-            return True
+    def refuse(self, name, address):
+        """No device is there, or its clock is off."""
         self.machine.expect(False, f"{name} was accessed without its clock" if name else f"0x{address:08X} was accessed, which is not modelled")
-        return False
+        return 0
 
     def read(self, block, offset):
         name, clock, read, _ = self.devices.get(block, NO_DEVICE)
-        return read(offset) if self.may_access(name, clock, block + offset) else 0
+        if clock is None or self.machine.clocks.is_enabled(*clock):
+            return read(offset)
+        return self.refuse(name, block + offset)
 
     def write(self, block, offset, value):
         name, clock, _, write = self.devices.get(block, NO_DEVICE)
-        if self.may_access(name, clock, block + offset):
+        if clock is None or self.machine.clocks.is_enabled(*clock):
             write(offset, value)
+        else:
+            self.refuse(name, block + offset)
         self.machine.touch()
         if name not in self.without_interrupts:
             self.machine.clock.is_asked_to_stop = 1  # Other interrupts may come now.

@@ -9,7 +9,7 @@ from random import Random
 
 from .chip import MS, US
 
-BIT_NS = US
+BIT_NS, NEVER_NS = US, 1 << 60
 SENT, LOST, NO_ACKNOWLEDGEMENT, BIT_ERROR = range(4)
 LEFT, RIGHT = 266, 298
 
@@ -92,6 +92,8 @@ class Controller:
 
     def __init__(self, machine):
         self.machine, self.model = machine, getattr(self.library, f"{self.kind}_model_create")(machine.board.banks)
+        self.raw = RawFrame()
+        self.raw_reference = ctypes.byref(self.raw)
         for name in (
             "read",
             "write",
@@ -132,8 +134,7 @@ class Controller:
         return self.machine.clocks.runs_from_crystal() and self.timing()[0] == 1_000_000
 
     def offered(self):
-        raw = RawFrame()
-        mailbox = self.offer(ctypes.byref(raw))
+        mailbox, raw = self.offer(self.raw_reference), self.raw
         if mailbox < 0:
             return None, None
         self.machine.expect(not raw.extended and not raw.remote, "an extended or remote frame was sent")
@@ -190,8 +191,6 @@ class Wheel:
             self.target_mm_s, self.received_ns = frame.setpoint()[0], frame.time_ns
 
     def produce(self, now_ns):
-        if self.next_ns is None or now_ns < self.next_ns:
-            return
         for kind, period_ms in (("speed", 4), ("status", 40), ("force", 50)):
             while kind in self.due and self.due[kind] <= now_ns:
                 self.due[kind] += period_ms * MS
@@ -235,18 +234,23 @@ class Bus:
         self.suspended_ns = 0  # Until then the chip may not begin: an error-passive node waits 8 bits after each of its frames.
 
     def next_event_ns(self, now_ns):
-        times = [wheel.next_ns for wheel in self.wheels]
+        times = [wheel.next_ns for wheel in self.wheels if wheel.next_ns is not None]
         if self.current:
             times.append(self.current[2])
-        elif not self.stuck:
-            at_rest = not self.machine.can_listens or self.machine.can.is_on()
-            waiting = self.extra or self.flood or any(wheel.queue for wheel in self.wheels)
-            times.append(max(self.idle_ns, now_ns) if waiting else None)
-            times.append(self.idle_ns if self.idle_ns > now_ns else None)
-            times.append(self.suspended_ns if self.suspended_ns > now_ns else None)
-            times.append(None if at_rest else now_ns + 11 * BIT_NS)
-        self.calm = bool(self.current) or (not self.stuck and at_rest)
-        return min([time for time in times if time is not None], default=None)
+            self.calm = True
+        elif self.stuck:
+            self.calm = False
+        else:
+            self.calm = not self.machine.can_listens or self.machine.can.is_on()
+            if self.extra or self.flood or self.wheels[0].queue or self.wheels[1].queue:
+                times.append(max(self.idle_ns, now_ns))
+            if self.idle_ns > now_ns:
+                times.append(self.idle_ns)
+            if self.suspended_ns > now_ns:
+                times.append(self.suspended_ns)
+            if not self.calm:
+                times.append(now_ns + 11 * BIT_NS)
+        return min(times, default=NEVER_NS)
 
     def hold_dominant(self, on):
         self.stuck = on
@@ -278,7 +282,8 @@ class Bus:
 
     def advance(self, now_ns):
         for wheel in self.wheels:
-            wheel.produce(now_ns)
+            if wheel.next_ns is not None and now_ns >= wheel.next_ns:
+                wheel.produce(now_ns)
             if self.cut:
                 wheel.queue.clear()  # They go on among themselves.
         if self.stuck:
@@ -299,11 +304,11 @@ class Bus:
 
     def arbitrate(self, now_ns):
         mailbox, frame = self.machine.can.offered() if self.machine.can_listens and now_ns >= self.suspended_ns else (None, None)
-        candidates = [(frame.id, 0, frame, mailbox)] if frame else []
-        candidates += [(offer.id, 1, offer, None) for offer in self.offers()]
-        if not candidates:
+        for offer in self.offers():
+            if frame is None or offer.id < frame.id:  # Of one identifier the first wins, before all others the chip.
+                frame, mailbox = offer, None
+        if frame is None:
             return
-        _, _, frame, mailbox = min(candidates, key=lambda candidate: candidate[:2])
         if mailbox is not None:
             self.machine.can.begin(mailbox)
             self.attempts += 1

@@ -286,9 +286,10 @@ class PortF4(Port):
         """True if that may have changed a level."""
         if offset == 0x18:
             offset, value = 0x14, self.registers[0x14] & ~(value >> 16) | value & 0xFFFF
-        changed = self.registers[offset] != value
+        if self.registers[offset] == value:
+            return False
         self.registers[offset], self.levels = value, None
-        return changed
+        return True
 
 
 class Exti:
@@ -484,7 +485,7 @@ class DmaChannel:
     def carry(self, now_ns):
         """From memory to DR."""
         uart = self.chip.uart
-        while self.is_on() and self.left and self.next_move_ns() <= now_ns:
+        while self.left and self.is_on() and self.next_move_ns() <= now_ns:
             count = min(self.left, (now_ns - self.next_move_ns()) // uart.byte_ns() + 1)
             uart.transmit(self.chip.cpu.mem_read(self.registers["memory"] + self.length - self.left, count), self.next_move_ns())
             self.left -= count
@@ -501,7 +502,7 @@ class DmaChannel:
         self.end = True
 
     def next_event_ns(self):
-        if not self.is_on() or not self.left:
+        if not self.left or not self.is_on():
             return None
         return self.next_move_ns() + max(self.left - 2, 0) * self.chip.uart.byte_ns()
 

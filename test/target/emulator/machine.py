@@ -36,7 +36,6 @@ EXC_RETURN = 0xFFFFFFF9
 EXCEPTION_EXIT = 8  # Unicorn's number for a return from an exception.
 ABORTS = (3, 4)  # And those for code and data where the memory map allows none.
 NOWHERE = 0xFFFFFFFE
-NEVER_NS = 1 << 60
 BACK, ENDLESS = 0x080F0000, 0x080F0100  # In the flash, beyond every image; ENDLESS is an instruction that jumps to itself.
 SP, LR, PC, XPSR, PRIMASK = (getattr(arm, f"UC_ARM_REG_{name}") for name in ("SP", "LR", "PC", "XPSR", "PRIMASK"))
 FRAME = (arm.UC_ARM_REG_R0, arm.UC_ARM_REG_R1, arm.UC_ARM_REG_R2, arm.UC_ARM_REG_R3, arm.UC_ARM_REG_R12, LR, PC, XPSR)
@@ -177,7 +176,7 @@ class Machine:
                 self.now_ns = next_ns
                 continue
             self.sleeping = False
-            if self.enter_exception():
+            if self.pending and not self.active and self.enter_exception():
                 continue
             self.execute(self.now_ns + 1 if self.pending and not self.active else next_ns)
 
@@ -214,17 +213,22 @@ class Machine:
     def look_ahead(self):
         """When the next event is due, and whether nothing can happen before. Not so while bytes pass between memory and line, which
         goes on with every cycle, nor while the bus or the clocks come to rest."""
-        times = (
-            self.tick_ns,
-            self.watchdog.deadline_ns,
-            self.bus.next_event_ns(self.now_ns),
-            self.uart.next_event_ns(),
-            self.dma.next_event_ns(),
-            self.alarms[0][0] if self.alarms else None,
-        )
-        self.due_ns = min([time for time in times if time is not None], default=NEVER_NS)
-        calm = self.clocks.settled and self.bus.calm and not self.uart.typed and self.uart.idle_ns is None and times[4] is None
-        self.quiet_until_ns = self.due_ns if calm else 0
+        uart, due_ns = self.uart, self.bus.next_event_ns(self.now_ns)
+        times = [self.tick_ns, self.watchdog.deadline_ns]
+        calm = self.clocks.settled and self.bus.calm
+        if uart.typed or uart.idle_ns is not None:
+            times.append(uart.next_event_ns())
+            calm = False
+        sent_ns = self.dma.next_event_ns()
+        if sent_ns is not None:
+            times.append(sent_ns)
+            calm = False
+        if self.alarms:
+            times.append(self.alarms[0][0])
+        for time_ns in times:
+            if time_ns is not None and time_ns < due_ns:
+                due_ns = time_ns
+        self.due_ns, self.quiet_until_ns = due_ns, due_ns if calm else 0
 
     def attend(self):
         """Everything but the CPU, up to now."""
@@ -233,7 +237,8 @@ class Machine:
         if not self.clocks.settled:
             self.clocks.update(self.now_ns)
         self.bus.advance(self.now_ns)
-        self.uart.advance(self.now_ns)
+        if self.uart.typed or self.uart.idle_ns is not None:
+            self.uart.advance(self.now_ns)
         self.dma.advance(self.now_ns)
         self.count_tick()
         if self.port_a.changed or self.port_b.changed:
@@ -250,7 +255,7 @@ class Machine:
         if self.nmi:
             self.nmi = False
             self.pending.add(NMI)
-        lines = self.board.interrupts(self) & self.enabled
+        lines = self.board.interrupts(self) & self.enabled if self.enabled else 0
         while lines:
             irq = lines.bit_length() - 1
             lines ^= 1 << irq
