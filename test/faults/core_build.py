@@ -5,6 +5,7 @@ The core is a shared library here, so a change costs the compilation of one file
 changed library through LD_LIBRARY_PATH. The tree itself never changes.
 """
 
+import math
 import os
 import re
 import resource
@@ -26,8 +27,8 @@ CORE = ROOT / "core/src"
 INCLUDE = [f"-I{ROOT / path}" for path in ("core/include", "core/src", "app/sim/model/include", "test/sim", "test/support")]
 WHICH = "which.c"
 # Limit of a judge's processor time: TIMES its time with the unchanged core, plus MORE_S. A busy machine adds far less, so a judge
-# that exceeds the limit is in an endless loop.
-TIMES, MORE_S, UNMEASURED_S = 10, 3, 600
+# that exceeds the limit is in an endless loop. Its children may use CHILD_S more.
+TIMES, MORE_S, CHILD_S, UNMEASURED_S = 10, 1, 3, 600
 WAIT_S = 3600  # Wall-clock limit: a program that waits forever uses no processor time.
 OUTPUT_MAX = 64 << 20
 GCC = ["ccache", "gcc"] if shutil.which("ccache") else ["gcc"]
@@ -38,7 +39,7 @@ PATTERN = ("-ftrivial-auto-var-init=pattern",)
 # These signals are caused by the change under test; any other signal comes from outside and proves nothing.
 CRASHES = {signal.SIGILL, signal.SIGTRAP, signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGABRT, signal.SIGPIPE}
 NUMBER = "IWHEEL_MUTANT"
-ENDLESS = {signal.SIGXCPU, signal.SIGXFSZ, signal.SIGALRM}
+ENDLESS = {signal.SIGPROF, signal.SIGXCPU, signal.SIGXFSZ, signal.SIGALRM}
 # Unit tests that sweep every value run last: most changes fail an earlier one.
 SLOW = ("confirmation", "gateway_core_walk", "bit_timing", "codec_sweep", "envelope_scheduler")
 
@@ -74,7 +75,9 @@ def play(command, core, limit_s):
     """Runs a program with that core. Raises if another process ended it."""
 
     def limit():
-        resource.setrlimit(resource.RLIMIT_CPU, (limit_s, limit_s + 5))
+        whole_s = math.ceil(limit_s) + CHILD_S
+        resource.setrlimit(resource.RLIMIT_CPU, (whole_s, whole_s + 5))
+        signal.setitimer(signal.ITIMER_PROF, limit_s)  # exec preserves it, fork does not: the limit above is for children.
         resource.setrlimit(resource.RLIMIT_FSIZE, (OUTPUT_MAX, OUTPUT_MAX))
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
         signal.alarm(WAIT_S)  # exec preserves the alarm.
@@ -100,7 +103,7 @@ def play(command, core, limit_s):
 
 def limit_s(unchanged):
     """The limit in seconds of processor time, from the run with the unchanged core."""
-    return int(TIMES * unchanged.cpu_s) + MORE_S
+    return TIMES * unchanged.cpu_s + MORE_S
 
 
 def compile_file(source, out, *flags, gcc=("gcc",), include=tuple(INCLUDE)):

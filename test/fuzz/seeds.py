@@ -49,10 +49,9 @@ def json_vectors():
 def by_hand():
     """{target: [bytes]}: also inputs that a target must refuse."""
     sample = [line for path in (ROOT / "docs/user/northbound.md", ROOT / "README.md") for line in re.findall(r"\{\"[^`\n]*\}", path.read_text())]
-    drives = bytes([0, 1, 15, 1, 60, 1, 60, 11, 4, 0, 10, 11, 0, 10, 3, 232, 5, 3, 232, 5, 0, 40, 2, 200, 10, 0, 11, 2, 88, 9, 2, 88, 9, 0, 60])
     return {
         "codec": [bytes([n, 8, 0, *range(8)]) for n in range(len(IDS))] + [b"\xff\x80\x00\x01\x0a\x08\x00" + bytes(8)],
-        "gateway": [drives, drives + bytes([8, 0, 2, 1]) + drives, bytes([2]) + drives[1:]],
+        "gateway": [],
         "request": [line.encode() for line in sample]
         + json_vectors()
         + [b'{"cmd":"drive","left_mm_s":1e2,"right_mm_s":-1,"id":"x"}']
@@ -404,6 +403,14 @@ def put(number, data, own):
     return bytes([6, 0, GATEWAY_IDS.index(number), len(data)]) + data.ljust(8, b"\0")
 
 
+def short_drives():
+    """Arm and drive at two speeds in the world of fuzz_gateway.c. Frames of another device arrive meanwhile: with another identifier, each is a foreign setpoint."""
+    others = 3 * (put(600, bytes(4), False) + bytes([0, 8]))
+    arm, slow, fast = bytes([1, 60, 1, 60, 11, 4, 0, 10]), bytes([11, 0, 10, 3, 232, 5, 3, 232, 5]), bytes([2, 200, 10, 0, 11, 2, 88, 9, 2, 88, 9])
+    drives = bytes([0, 1, 15]) + arm + slow + others + fast + others
+    return [drives, drives + bytes([8, 0, 2, 1]) + drives, bytes([2]) + drives[1:]]
+
+
 def do(row):
     """A request, or a reading of the button, in the world of fuzz_gateway.c."""
     if row["type"] == "arm":
@@ -452,7 +459,7 @@ def recorded():
     """{target: [bytes]}: a target that does not accept them no longer tests its code."""
     return {
         "codec": codec(),
-        "gateway": gateway(),
+        "gateway": short_drives() + gateway(),
         "request": request(),
         "config": config(),
         "candump": candump(),

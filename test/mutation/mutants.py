@@ -69,6 +69,14 @@ def place(location):
     return location.get("offset"), location.get("tokLen", 0), False
 
 
+def definitions(dump, names):
+    """The syntax trees of these functions. Only they are parsed: nearly all of the dump comes from headers."""
+    for text in dump.partition('\n  "inner": [\n    {')[2].rpartition("\n    }\n  ]")[0].split("\n    },\n    {"):
+        name = '\n      "kind": "FunctionDecl",\n' in text and re.search(r'^      "name": "(\w+)",$', text, re.M)
+        if name and name[1] in names:
+            yield json.loads("{" + text + "}")
+
+
 class Finder:
     """Walks the functions of one file."""
 
@@ -76,17 +84,16 @@ class Finder:
         self.path, self.source, self.found = Path(path), Path(path).read_text(), []
         self.name = name or self.path.name
         plain = re.sub(rf"(?<!#define )\b({'|'.join(HINTS)})(?=\()", lambda match: " " * len(match[1]), self.source)
-        tree = subprocess.run(
+        dump = subprocess.run(
             ["clang", "-Xclang", "-ast-dump=json", "-fsyntax-only", "-w", *flags, "-xc", "-"], input=plain, capture_output=True, text=True, check=True
         ).stdout
         names = set(re.findall(r"^[\w \*]*?\b(\w+)\([^;{}]*\) \{$", self.source, re.M))
         self.function = None
-        for node in json.loads(tree)["inner"]:
-            if node["kind"] == "FunctionDecl" and node["name"] in names:
-                body = [child for child in node.get("inner", ()) if child["kind"] == "CompoundStmt"]
-                if body:
-                    self.function, self.declaration = node["name"], node
-                    self.visit(body[0], None)
+        for node in definitions(dump, names):
+            body = [child for child in node.get("inner", ()) if child["kind"] == "CompoundStmt"]
+            if body:
+                self.function, self.declaration = node["name"], node
+                self.visit(body[0], None)
 
     def add(self, kind, span, text):
         if span and re.search(rf"\b({'|'.join(HINTS)})$", self.source[: span[0]]):
