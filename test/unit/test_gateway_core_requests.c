@@ -375,3 +375,19 @@ TEST(test_gateway_shutdown_ramps) {
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_SHUTDOWN, rig.gateway.permit.stop.cause);
     TEST_ASSERT_FALSE(gateway_rig_told_zero(&rig));
 }
+
+TEST(test_gateway_release_ends_zeros_only_after_the_ramp) {
+    rig.config.hold = true;
+    gateway_rig_begin(&rig, false);
+    gateway_rig_run(&rig, MS(1000));
+    gateway_rig_arm(&rig);
+    (void)gateway_rig_cruise(&rig, 400, 400, MS(1000));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_AT_REST, iw_gateway_release(&rig.gateway));
+    gateway_rig_stop(&rig);
+    gateway_rig_run(&rig, MS(60000));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, state());
+    TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, iw_gateway_release(&rig.gateway));
+    gateway_rig_run(&rig, MS(1000));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, state());
+}
