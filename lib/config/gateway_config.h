@@ -58,7 +58,7 @@ typedef struct gateway_config {
         uint16_t watch_mode;
         char watch_group[33];
         uint16_t max_watchers; ///< Watchers, 1..64, in addition to max_clients.
-        uint16_t max_age_ms;   ///< Largest age of `t_us` in arm, reset and confirm, 200..2000.
+        uint16_t max_age_ms;   ///< Largest age in ms of `t_us` in arm, reset, release and confirm, 200..2000.
     } northbound;
     struct {
         bool has_battery;               ///< A battery threshold is configured; it has no default.

@@ -63,7 +63,7 @@ typedef struct {
 /// Result of a drive request.
 typedef struct {
     iw_pair_t pair; ///< The target after limits. The scheduler reaches it by ramps.
-    bool limited; ///< The target differs from the request: both speeds scaled by one factor, or a current limit raised.
+    bool limited;   ///< Both speeds or both currents were scaled by one factor, or a current limit raised.
 } iw_applied_t;
 
 /// State of the controller. Only the core may use its members; snapshot.h has the values that others may read. Short

@@ -326,7 +326,7 @@ typedef struct {
     int32_t right_mm_s; ///< Target after limits.
     int32_t left_mA;    ///< Target after limits.
     int32_t right_mA;   ///< Target after limits.
-    bool limited;       ///< The gateway scaled both wheels by one factor.
+    bool limited;       ///< Both wheels were scaled by one factor, or a current limit was raised.
 } iwc_applied_t;
 
 /// Sends one drive command, once. It is valid for one lease. With `timeout_ms` 0 the call only sends, and `iwc_next`

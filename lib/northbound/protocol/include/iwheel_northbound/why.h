@@ -15,7 +15,7 @@ extern "C" {
 
 /// Data about a stop outside the core. `client` and `reason` may be NULL.
 typedef struct {
-    const char *client; ///< Form of gw_client_describe.
+    const char *client; ///< Client as in messages: `"joystick" (client 3)` (iwn_target_name).
     const char *reason; ///< Reason in the client's e-stop request.
     const char *estop;  ///< Name of the e-stop line.
     const char *bus;    ///< Name of the bus.

@@ -69,7 +69,7 @@ const iwn_id_t *iwn_target_settled(iwn_server_t *self, iwn_client_t *client);
 /// Reports a tare of a wheel, with the statistics of its window.
 void iwn_target_tared(iwn_server_t *self, const iwn_client_t *client, iw_side_t side, const iw_force_quality_t *window);
 
-/// Executes a request that only some programs know (confirm, config, recordings, recording), or refuses it.
+/// Executes a request that only some programs know (confirm, config, recordings, recording, record), or refuses it.
 void iwn_target_other(iwn_server_t *self, iwn_client_t *client);
 
 // Contents of events and replies.
