@@ -25,7 +25,7 @@ build(clang check clang clang 46)
 set(S build/sanitize)
 build(sanitize.build ci sanitize "" 103)
 tests(sanitize ci unit sanitize 40)
-# These run natively: no sanitizer works in the kernel of the tests. More processes than processors would stall each other.
+# These run natively: no sanitizer works in the kernel of the tests.
 test(beside sanitize.ctl ci realtime sanitize py:pytest 240 ${PYTEST} test/ctl --build ${S} --jobs 4)
 test(beside sanitize.client ci realtime sanitize py:pytest 22 ${PYTEST} test/client --build ${S})
 test(beside sanitize.web ci realtime sanitize "${S}/app/bridge/web/iwheel-web py:pytest" 60 ${PYTEST} test/web --build ${S} -k "token_missing or token_over or paths or with_a_body or leave_room or unix_socket or killed_is or page_drives or slow_conn")
@@ -142,9 +142,9 @@ test(idle python.types check lint "" py:mypy 10 sh -c "cd python && ../.venv/bin
 test(idle python check scenario "default;kernel.build" py:pytest 80 ${PYTEST} python/tests --build ${B} --virtual --jobs ${JOBS})
 test(beside python.realtime check realtime default py:pytest 25 ${PYTEST} python/tests --build ${B} --jobs 3 -m native)
 set(files test/ctl/test_recordings.py test/ctl/test_learn_table.py) # They only compute.
-set(bringup test/ctl/test_bringup.py) # Twelve minutes of waiting: virtual time costs six times the processor time that they use in real time.
+# The tests of bringup wait twelve minutes: virtual time costs six times the processor time that they use in real time.
 test(idle ctl check scenario "default;kernel.build" py:pytest 60 ${PYTEST} test/ctl --build ${B} --virtual --jobs ${JOBS} --ignore-glob=*/test_recordings.py --ignore-glob=*/test_learn_table.py --ignore-glob=*/test_bringup.py)
-test(beside ctl.bringup check realtime default py:pytest 200 ${PYTEST} ${bringup} --build ${B} --jobs 4)
+test(beside ctl.bringup check realtime default py:pytest 200 ${PYTEST} test/ctl/test_bringup.py --build ${B} --jobs 4)
 test(idle ctl.files check unit default py:pytest 6 ${PYTEST} ${files} --build ${B} --jobs ${JOBS})
 test(beside ctl.realtime check realtime default py:pytest 36 ${PYTEST} test/ctl --build ${B} --jobs 4 -m native)
 test(beside captures check realtime default "" 22 python3 test/ctl/captures --build ${B} --check)
