@@ -4,7 +4,8 @@
 //     fast_peer DOMAIN SPEED_M_S          requests to arm, drives for 1.5 s, ends
 //     fast_peer DOMAIN SERVICE CALLS      calls a service this often, each time as a new client, as rmw_fastrtps does; 0: 100 clients without a call
 //     fast_peer DOMAIN SERVICE late       calls it before the bridge knows the writer: the announcement is sent LATE later
-//     fast_peer DOMAIN SERVICE stored     the same with a writer that stores its samples, and has written two before the bridge was there
+//     fast_peer DOMAIN SERVICE lost       the same, and it loses the first request for the missing call, as Fast DDS ignores one that comes too early
+//     fast_peer DOMAIN SERVICE stored     late, with a writer that stores its samples, and has written two before the bridge was there
 #include <fastcdr/Cdr.h>
 #include <fastcdr/FastBuffer.h>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
@@ -39,6 +40,7 @@
 #include <mutex>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 using namespace eprosima::fastdds::dds;
@@ -120,6 +122,40 @@ static void hold(bool wanted) {
         std::printf("%zu announcements sent late\n", held.size());
     }
     held.clear();
+}
+
+// ---- a lost request for missing samples ---------------------------------------------------------------------------------
+
+static bool losing = false;
+static int lost = 0;
+
+// Returns true for the first bytes with an ACKNACK that requests a sample of a writer of the application.
+static bool loses(const uint8_t *bytes, size_t size) {
+    std::lock_guard<std::mutex> guard(lock);
+    for (size_t at = 20; losing && lost == 0 && at + 28 <= size;) {
+        const size_t rest = (bytes[at + 1] & 1) ? bytes[at + 2] | bytes[at + 3] << 8 : bytes[at + 2] << 8 | bytes[at + 3];
+        const bool requests = (bytes[at + 20] | bytes[at + 21] | bytes[at + 22] | bytes[at + 23]) != 0;
+        lost = (bytes[at] == 0x06 && (bytes[at + 11] == 2 || bytes[at + 11] == 3) && requests) ? 1 : 0;
+        at = (rest == 0) ? size : at + 4 + rest;
+    }
+    return losing && lost > 0 && std::exchange(losing, false);
+}
+
+// These replace the functions of libc: Fast DDS receives with one or the other.
+extern "C" ssize_t recvfrom(int fd, void *data, size_t size, int flags, struct sockaddr *from, socklen_t *from_size) {
+    ssize_t came = 0;
+    do {
+        came = syscall(SYS_recvfrom, fd, data, size, flags, from, from_size);
+    } while (came > 0 && loses(static_cast<const uint8_t *>(data), static_cast<size_t>(came)));
+    return came;
+}
+
+extern "C" ssize_t recvmsg(int fd, struct msghdr *message, int flags) {
+    ssize_t came = 0;
+    do {
+        came = syscall(SYS_recvmsg, fd, message, flags);
+    } while (came > 0 && loses(static_cast<const uint8_t *>(message->msg_iov[0].iov_base), static_cast<size_t>(came)));
+    return came;
 }
 
 // ---- types ------------------------------------------------------------------------------------------------------------
@@ -322,7 +358,8 @@ static void call(const Client &client, bool late) {
 // The clients of rmw_fastrtps: the request names the reader of its replies, and the reply has that request's identity.
 static void call_service(Node &node, const std::string &name, const std::string &how) {
     const bool stored = how == "stored";
-    const bool late = stored || how == "late";
+    losing = how == "lost";
+    const bool late = stored || losing || how == "late";
     const int calls = late ? 1 : std::atoi(how.c_str());
     Topic *request_topic = node.topic(Kind::Request, ("rq/" + name + "Request").c_str(), "std_srvs::srv::dds_::Trigger_Request_");
     Topic *reply_topic = node.topic(Kind::Reply, ("rr/" + name + "Reply").c_str(), "std_srvs::srv::dds_::Trigger_Response_");
@@ -346,7 +383,7 @@ static void call_service(Node &node, const std::string &name, const std::string 
         node.publisher->delete_datawriter(client.requests);
         node.subscriber->delete_datareader(client.replies);
     }
-    std::printf("%d clients\n", clients);
+    std::printf("%d clients, %d requests lost\n", clients, lost);
 }
 
 int main(int argc, char **argv) {

@@ -81,19 +81,19 @@ def called_late(ride, program, service, how="late"):
     output = run_fast(ride, program, service, how)
     called = re.search(r"called at (\d+) us", output)
     ride.t.check(called and re.search(r"[1-9]\d* announcements sent late", output), f"{service}: the request comes before its writer is known: {output}")
+    ride.t.check(how != "lost" or "1 requests lost" in output, f"{service}: the first request for the missing call is lost: {output}")
     return output, int(called[1]) if called else 0
 
 
-@scenario("Fast DDS calls before the bridge knows the writer: stop and estop stop within 200 ms, arm gets a reply", 40)
-def fast_calls_first(t):
+def calls_first(t, how):
     program = fast_peer(t)
     ride = Ride(t)
-    output, _ = called_late(ride, program, "iwheel/arm")
+    output, _ = called_late(ride, program, "iwheel/arm", how)
     t.check("reply 1" in output and "armed: send cmd_vel" in output, f"arm: {output}")
     ride.silence()
     for service, after in (("iwheel/stop", lambda speed: abs(speed) < 290), ("iwheel/estop", lambda speed: speed == 0)):
         stream = ride.driving()
-        output, called_us = called_late(ride, program, service)
+        output, called_us = called_late(ride, program, service, how)
         t.check("reply 1" in output, f"{service}: {output}")
         time.sleep(0.2)
         ms = t.first_after(ride.rig, called_us, after, f"the effect of {service}", 200)
@@ -105,6 +105,16 @@ def fast_calls_first(t):
             time.sleep(0.6)
     t.check(ride.client.request("status")["state"] == "latched", "latched")
     t.judge(ride.rig)
+
+
+@scenario("Fast DDS calls before the bridge knows the writer: stop and estop stop within 200 ms, arm gets a reply", 40)
+def fast_calls_first(t):
+    calls_first(t, "late")
+
+
+@scenario("the same while Fast DDS misses the bridge's first request for the call: stop and estop stop within 200 ms", 40)
+def fast_misses_a_request(t):
+    calls_first(t, "lost")
 
 
 @scenario("Fast DDS stores two stops from before the start of the bridge, and calls before the bridge knows it: one stop within 200 ms", 40)
