@@ -91,6 +91,7 @@ test(idle daemon.kills check+full safety default ${B}/test/daemon/test_daemon 15
 test(idle orders check+full safety default "" 20 ${B}/test/orders/test_orders --part 0/2 ${full})
 test(idle orders.second check+full safety default "" 20 ${B}/test/orders/test_orders --part 1/2 ${full})
 test(idle faults check faults default "" 72 test/faults/run --build ${B} --jobs ${JOBS})
+test(beside faults.python check faults default "" 115 ${PY} test/faults/run --python)
 test(idle safety quick lint "" "" 1 scripts/safety_case.py)
 test(idle fuzz check+full fuzz "" "" 129 test/fuzz/run --jobs ${JOBS} --seconds ${fuzz_seconds})
 test(idle mutation check+full faults default "" 40 test/mutation/run --build ${B} --jobs ${JOBS})

@@ -9,7 +9,7 @@ import sys
 
 from table import ROOT
 
-TIMEOUT_S = 60
+TIMEOUT_S = 300  # The longest takes 30 s; a lost cancellation or reply makes some of them wait.
 
 
 def judge(applied, tests, folder):
