@@ -133,7 +133,7 @@ class Client:
 
 
 class Streamer(threading.Thread):
-    """Drives in the background until told to stop or refused."""
+    """Drives in the background until `stop`, or until the gateway refuses a command."""
 
     def __init__(self, client, left, right, every=0.05):
         super().__init__(daemon=True)

@@ -33,7 +33,7 @@ def presses(run):
 
 
 def pytest_verdict_end(run):
-    """Invariant 2 speaks of the 99th percentile: over all presses of row 11 together. If most of them are not timed, it is skipped."""
+    """Invariant 2 limits the 99th percentile of all presses of row 11 together. If most of them are not timed, it is skipped."""
     every = presses(run)
     values = [latency_us for latency_us, stalled in every if not stalled]
     if not every:

@@ -379,7 +379,7 @@ class Rig:
         deadline = time.monotonic() + 10
         while "held" not in process.text():
             if time.monotonic() > deadline:
-                raise RuntimeError(f"the stranger holds nothing: {process.text()}")
+                raise RuntimeError(f"the other user's process holds no name: {process.text()}")
             time.sleep(0.02)
         return process
 

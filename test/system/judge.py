@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Decides from a bus log and a timeline whether the safety rules were kept.
+"""Decides from a bus log and a timeline whether each safety rule was obeyed.
 
 Written from the rules of motion permission, not from the gateway's code. The bus log is the only witness of what the gateway
 did; the timeline lists the actions of the scenario. Times are integer microseconds of CLOCK_MONOTONIC; see judge_log.py for the timeline.
@@ -182,7 +182,7 @@ class Judge(Reading):
             self._say("slew", after.t_us, text, (step - allowed) * 1e6 / slope)
         elif not self._cut_near(after.t_us):
             text = f"{before.speed} mm/s to zero without ramp and without a reason"
-            self._say("hard_stop", after.t_us, text, 0)  # a stalled machine is a reason: its wheels fall silent
+            self._say("hard_stop", after.t_us, text, 0)  # a stalled machine is a reason: its wheels go offline
 
     def _cut_near(self, t_us):
         kinds = ("press", "estop", "cut", "restart_hold")
@@ -281,7 +281,7 @@ class Judge(Reading):
         return min([until_us] + ([killed_us] if killed_us else []) + resets[:1])
 
     def _rest_since_us(self, from_us):
-        """When both wheels have been at rest for the settling time, at from_us or later. Unheard is not at rest."""
+        """When both wheels have been at standstill for the settling time, at from_us or later. An offline wheel is not at standstill."""
         since = {SPEED_IDS[0]: None, SPEED_IDS[1]: None}
         heard = dict(since)
         # What was before the settling time does not matter: telemetry of a wheel at standstill is back within UNHEARD_US.

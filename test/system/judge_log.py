@@ -88,7 +88,7 @@ class Setpoint(NamedTuple):
 
 
 class Session:
-    """From one arm to the silence after it."""
+    """From one arm until the gateway stops sending."""
 
     def __init__(self, begin_us, armed_us):
         self.begin_us, self.armed_us = begin_us, armed_us
@@ -142,7 +142,7 @@ class Reading:
         )
 
     def bus_stalls(self):
-        """When the simulated bus stood still, [(until_us, for_us)]: two wheels send a frame every 4 ms each. A scenario may be the cause."""
+        """When the simulated bus was stalled, [(until_us, for_us)]: two wheels send a frame every 4 ms each. A scenario may be the cause."""
         times = [frame.t_us for frame in self.frames if frame.id in SPEED_IDS and not frame.own]
         return [(b, b - a) for a, b in itertools.pairwise(times) if b - a > BUS_STALL_US]
 

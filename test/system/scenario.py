@@ -43,7 +43,7 @@ def scenario(title, seconds=5, native=""):
 class Test(Evidence):
     """Collects failures as verdict.Failure, figures, and stalls that the test itself has measured."""
 
-    __test__ = False  # pytest does not look for tests in it.
+    __test__ = False  # pytest does not collect tests from it.
     rig_type = Rig
 
     def __init__(self, build, rig_type=None):
@@ -85,7 +85,7 @@ class Test(Evidence):
         return refused and self.check(len(reply.get("message") or "") > 10, f"{error} without a message: {reply}")
 
     def arm(self, client, **fields):
-        """Arms; tries again for a while if the wheels are not at rest yet."""
+        """Arms; tries again for a while if the wheels are not at standstill yet."""
         reply = client.arm(**fields)
         for _ in range(60):
             if reply["ok"] or reply["error"] not in AWAITED:

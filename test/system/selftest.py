@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The judge detects each fault. Good logs pass; every seeded fault is found under the rule it breaks.
 
-The logs come from a small ideal gateway written here, so that a judge that always says "good" or always "bad" fails.
+The logs come from a small ideal gateway written here, so that a judge that always returns "good" or always "bad" fails.
 """
 
 import struct
@@ -155,7 +155,7 @@ def faults():
     yield "a log without telemetry", [x for x in f if is_setpoint(x)], e, "empty"
     yield "nothing ever commanded", between(f, 0, 99_999, with_data(1, 0)), e, "never_moved"
     yield "wheels that never turn", [x if is_setpoint(x) else x._replace(data=bytes(4)) for x in f], e, "never_turned"
-    yield "armed, but silent", between(f, 0, 99_999, drop), e, "never_sent"
+    yield "armed, but nothing is sent", between(f, 0, 99_999, drop), e, "never_sent"
     yield "one wheel never sent to", between(f, 0, 99_999, only(1, drop)), e, "never_sent"
     yield "a zero pair before anybody armed", add(f, *pair(1_200, 0, 0)), e, "sent_in_listening"
     yield "a moving pair before anybody armed", add(f, *pair(1_200, 100, 100)), e, "motion_unarmed"

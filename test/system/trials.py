@@ -28,18 +28,18 @@ def until(condition, seconds=10.0, what="it"):
 
 
 class Driver(threading.Thread):
-    """A client of the gateway that drives until it is told to end, or the wheels are stopped."""
+    """A client of the gateway that drives until it must end, or the wheels are stopped."""
 
     def __init__(self, rig, speed=200):
         super().__init__(daemon=True)
         self.client, self.speed, self.ended = rig.client(name="joystick"), speed, threading.Event()
         self.turning = False
         self.start()
-        until(lambda: rig.bus.setpoints() and abs(rig.bus.setpoints()[-1][2]) == speed, what="the wheels are told to turn, and at this speed")
+        until(lambda: rig.bus.setpoints() and abs(rig.bus.setpoints()[-1][2]) == speed, what="the wheels are commanded to turn, and at this speed")
         self.turning = True
 
     def run(self):
-        """A busy machine may stop the wheels before the test begins: then once more, after the silence that `arm` wants."""
+        """A busy machine may stop the wheels before the test begins: then once more, after the time without commands that `arm` needs."""
         wait, cmd = 0.05, {"cmd": "arm", "name": "joystick"}
         try:
             while not self.ended.wait(wait):
@@ -77,4 +77,4 @@ def braking_ms(rig, since_us, seconds=2):
             last[wheel] = abs(speed)
         return None
 
-    return (until(found, seconds, "the wheels are told to brake") - since_us) / 1000
+    return (until(found, seconds, "the wheels are commanded to brake") - since_us) / 1000

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Row 29 and bad arguments: refused with the right exit code, file, line and cure."""
+"""Row 29 and bad arguments: refused with the right exit code, file, line and fix."""
 
 import contextlib
 import os
@@ -9,7 +9,7 @@ import subprocess
 from scenario import Skip, scenario
 
 USAGE, UNAVAILABLE, CONFIGURATION = 64, 69, 78
-DEFAULT_DIRECTORY = "/var/lib/iwheel"  # Where a gateway records whom nobody told otherwise.
+DEFAULT_DIRECTORY = "/var/lib/iwheel"  # Where a gateway records by default.
 
 
 def call(rig, program, *arguments, seconds=5, **options):
@@ -35,7 +35,7 @@ def arguments(t):
         for bad in (("--nonsense",), ("-Z",)):
             code, text = call(rig, program, *bad)
             t.check(code == USAGE and bad[0].lstrip("-") in text, f"{program} {bad}: {code}, {text[:160]!r}")
-            t.check("--help" in text, f"{program} {bad} tells where help is: {text[:160]!r}")
+            t.check("--help" in text, f"{program} {bad} names --help: {text[:160]!r}")
     cases = [
         ("iwheel-gateway", ("-c",), USAGE),
         ("iwheel-gateway", ("surplus",), USAGE),
@@ -60,10 +60,10 @@ def arguments(t):
     for program, words, expected in cases:
         code, text = call(rig, program, *words)
         t.check(code == expected, f"{program} {' '.join(words)[:60]}: exit code {code}, {expected} expected: {text[:160]!r}")
-        t.check(len(text) > 15, f"{program} {words} says nothing")
+        t.check(len(text) > 15, f"{program} {words} prints no reason")
     made = os.path.isdir(DEFAULT_DIRECTORY) and not recorded
     if made:
-        os.rmdir(DEFAULT_DIRECTORY)  # So that another attempt sees it too.
+        os.rmdir(DEFAULT_DIRECTORY)  # So that the next attempt detects it too.
     t.check(not made, f"nothing was made outside of the test: {DEFAULT_DIRECTORY}")
     t.figure(f"{len(cases) + 12} calls")
 
@@ -83,7 +83,7 @@ PROGRAMS = ("iwheel-gateway", "iwheelctl", "iwheel-sim", "iwheel-serial", "iwhee
 
 
 def built(rig):
-    """The programs that are there: a bridge is built only where its libraries are."""
+    """The programs that exist: a bridge is built only if its libraries are installed."""
     for program in PROGRAMS:
         try:
             rig.program(program)
@@ -110,7 +110,7 @@ def meaningless_arguments(t):
         ):
             code, text = call(rig, program, *common, *words, seconds=2)
             t.check(code == USAGE, f"{program} {words}: exit code {code}: {text[:160]!r}")
-            t.check(about in text and "leave it out" in text, f"{program} {words} tells the fix: {text[:160]!r}")
+            t.check(about in text and "leave it out" in text, f"{program} {words} names the fix: {text[:160]!r}")
             calls += 1
     valued = {
         "iwheel-gateway": ("-c", "--can", "--socket", "--watch-socket", "--estop", "--log-level"),
@@ -131,7 +131,7 @@ def meaningless_arguments(t):
 
 
 def closed_pipe():
-    """The writing end of a pipe whose reader is gone."""
+    """The writing end of a pipe without a reader."""
     reader, writer = os.pipe()
     os.close(reader)
     return writer
@@ -150,13 +150,13 @@ def closed_streams(t):
         pipe = closed_pipe()
         with subprocess.Popen([rig.program("iwheel-fleet")], stdin=subprocess.DEVNULL, stdout=pipe, stderr=pipe) as fleet:
             try:
-                t.check(fleet.wait(5) >= 0, "iwheel-fleet ends when nobody reads its table")
+                t.check(fleet.wait(5) >= 0, "iwheel-fleet ends when its table has no reader")
             except subprocess.TimeoutExpired:
                 fleet.kill()
-                t.check(False, "iwheel-fleet goes on although nobody reads its table")
+                t.check(False, "iwheel-fleet continues although its table has no reader")
         os.close(pipe)
     os.mkdir(rig.path("shared"))
-    os.chmod(rig.path("shared"), 0o1777)  # Worth a warning before anything else.
+    os.chmod(rig.path("shared"), 0o1777)  # The gateway logs a warning about this first.
     rig.socket_name = "shared/gateway.sock"
     pipe = closed_pipe()
     rig.start_gateway(setup=lambda: os.dup2(pipe, 2))
@@ -199,7 +199,7 @@ BAD_CONFIGURATIONS = [
 ]
 
 
-@scenario("bad configuration: refused with file, line and cure; nothing is sent", 5)
+@scenario("bad configuration: refused with file, line and fix; nothing is sent", 5)
 def row29_bad_configuration(t):
     rig = t.rig()
     path = rig.path("bad.conf")
@@ -249,7 +249,7 @@ def print_config_and_check(t):
     t.check(code == 0 and "ok" in text and "fail" not in text.lower().replace("0 fail", ""), f"--check with all there: {code}, {text[:400]!r}")
     rig.sim.ask("estop press")
     code, text = call(rig, "iwheel-gateway", *common, "--check")
-    t.check("press" in text.lower(), f"--check tells that the button is pressed: {text[:400]!r}")
+    t.check("press" in text.lower(), f"--check reports that the button is pressed: {text[:400]!r}")
     rig.sim.end()
     code, text = call(rig, "iwheel-gateway", *common, "--check")
     t.check(code != 0 and "fail" in text.lower(), f"--check without a bus: {code}, {text[:400]!r}")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Driving as it is meant to be."""
+"""Driving without faults."""
 
 import json
 import time
@@ -7,11 +7,11 @@ import time
 from scenario import scenario
 
 
-@scenario("arm, drive, turn, stop, silence", 8)
+@scenario("arm, drive, turn, stop, nothing sent afterwards", 8)
 def nominal_drive_and_turn(t):
     rig, client = t.running()
     reply = t.arm(client)
-    t.check(reply["lease_ms"] == 200 and reply["stop_budget_ms"] <= 1000, f"arm tells lease and stop budget: {reply}")
+    t.check(reply["lease_ms"] == 200 and reply["stop_budget_ms"] <= 1000, f"the reply to arm has lease and stop budget: {reply}")
     t.drive_for(client, 400, 400, 1.5)
     status = client.request("status")
     for side in ("left", "right"):
@@ -29,12 +29,12 @@ def nominal_drive_and_turn(t):
     why = t.stopped_by(client, "client_stop", "listening")
     t.check(not why["latched"], "a stop does not latch")
     truth = json.loads(rig.sim.ask("status"))
-    t.check(truth is not None, "the simulator tells the truth")
+    t.check(truth is not None, "the simulator reports its state")
     time.sleep(0.3)
     t.judge(rig)
 
 
-@scenario("arming alone moves nothing; the first lease ends by itself", 5)
+@scenario("arming alone moves nothing; the first lease ends on its own", 5)
 def arm_moves_nothing(t):
     rig, client = t.running()
     t.arm(client)
@@ -42,7 +42,7 @@ def arm_moves_nothing(t):
     t.check(rig.wait_status(client, lambda s: s["state"] == "stopping", 2), "the lease ends without a drive")
     t.figure(f"lease ended after {time.monotonic() - begin:.2f} s")
     t.check(0.8 <= time.monotonic() - begin <= 1.3, "the first lease is one second", True)
-    t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 3), "then silence")
+    t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 3), "then nothing is sent")
     t.stopped_by(client, "lease_lost", "listening")
     t.rule(not any(speed for _, _, speed in rig.bus.setpoints()), "nothing but zeros")
     t.judge(rig, moves=False)
@@ -88,7 +88,7 @@ def other_configuration(t):
         left and all(frame.data[3:5] == (-1000).to_bytes(2, "big", signed=True) for frame in left[2:]), "speed and current are negated for the mirrored wheel"
     )
     client.request("stop")
-    t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 4), "silence at the end")
+    t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 4), "nothing is sent at the end")
     t.judge(rig)
 
 
@@ -115,7 +115,7 @@ def force_offset_and_tare(t):
     status = client.request("status")
     t.check(status["left"]["offset_provenance"] == "operator", f"tare counts as the operator's: {status['left']['offset_provenance']}")
     t.check(status["right"]["offset_provenance"] == "wheel", "the other wheel is untouched")
-    t.rule(not rig.bus.setpoints(), "nothing of that sends anything")
+    t.rule(not rig.bus.setpoints(), "none of these requests sends a setpoint")
     t.judge(rig, moves=False)
 
 
@@ -128,8 +128,8 @@ def unknown_is_null(t):
     status = client.request("status")
     for side in ("left", "right"):
         for key in ("speed_rpm", "speed_mm_s", "battery_dV", "ticks", "force_net_mN", "applied_mm_s", "speed_age_ms"):
-            t.check(status[side][key] is None, f"{side} {key} is {status[side][key]} although never heard")
+            t.check(status[side][key] is None, f"{side} {key} is {status[side][key]} although it was never received")
     t.expect(client.arm(), "wheel_lost")
     rig.sim.ask("power on")
-    t.check(rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"], 8), "heard once they have power")
+    t.check(rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"], 8), "online once they have power")
     t.judge(rig, moves=False)

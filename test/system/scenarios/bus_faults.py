@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Rows 15 (local bus), 18, 19, 20: power lost, foreign masters, frames that are none."""
+"""Rows 15 (local bus), 18, 19, 20: power lost, other masters, frames that are not valid."""
 
 import signal
 import struct
@@ -37,12 +37,12 @@ def power_cut(t, seconds, speed):
     stream.stop()
     why = t.stopped_by(client, "wheel_lost") if client.request("why")["cause"] != "send_stalled" else t.stopped_by(client, "send_stalled")
     refusal = client.request("reset")
-    t.check(not refusal["ok"], "reset waits until the wheels are heard")
+    t.check(not refusal["ok"], "reset is refused until the wheels are online")
     time.sleep(seconds - 0.4)
     back_us = now_us()
     rig.sim.ask("power on")
     rig.timeline.append(Event(back_us, "alive", now_us()))
-    t.check(rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"], 10), "the wheels are heard again")
+    t.check(rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"], 10), "the wheels are online again")
     time.sleep(0.5)
     late = [(at, side, value) for at, side, value in rig.bus.setpoints(back_us)]
     moving = [entry for entry in late if entry[2]]
@@ -50,7 +50,7 @@ def power_cut(t, seconds, speed):
         len([e for e in moving if e[1] == LEFT]) <= 1 and len([e for e in moving if e[1] == RIGHT]) <= 1,
         f"at most one old frame per wheel came out: {[(at - back_us, side, value) for at, side, value in moving]}",
     )
-    t.check(max(abs(rig.bus.speed_rpm(side)) for side in (0, 1)) <= 2, "the wheels stand")
+    t.check(max(abs(rig.bus.speed_rpm(side)) for side in (0, 1)) <= 2, "the wheels are at standstill")
     wait_reset(t, client)
     t.figure(f"{why['cause']}, {len(moving)} old and {len(late) - len(moving)} zero frames afterwards")
     t.arm(client)
@@ -127,7 +127,7 @@ def row19_second_master_listening(t):
         rig.bus.send(LEFT, FOREIGN_ZERO)
         rig.bus.send(RIGHT, FOREIGN_ZERO)
         time.sleep(0.02)
-        if end - time.monotonic() < 0.9:  # after the first frames were surely seen
+        if end - time.monotonic() < 0.9:  # The gateway has received the first frames by then.
             t.expect(client.arm(), "second_master")
     t.check(client.request("status")["state"] == "listening", "it is an event, not a latch")
     t.check(any(e["event"] == "fault" and e["cause"] == "second_master" for e in client.collect(0.1)), "and the event comes")
@@ -163,7 +163,7 @@ def feed(rig, seconds, can_id, data):
         time.sleep(0.004)
 
 
-@scenario("remote, extended, FD and short frames on known ids: counted, and no sign of life", 7)
+@scenario("remote, extended, FD and short frames on known ids: counted, but the wheel counts as offline", 7)
 def row20_odd_frames(t):
     rig, client = t.running()
     before = client.request("status")["counters"]
@@ -211,7 +211,7 @@ def row20_odd_setpoints(t):
     t.judge(rig)
 
 
-@scenario("the bus goes away and comes back: stop, found again, nothing moves", 9)
+@scenario("the bus disappears and returns: stop, found again, nothing moves", 9)
 def row15_bus_gone(t):
     rig, client = t.running()
     t.arm(client)

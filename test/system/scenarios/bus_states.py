@@ -18,9 +18,9 @@ from .process import driving
 
 
 def drive_again(t, rig, client, seconds=8):
-    """Both wheels are heard, reset is accepted, nothing moves by itself, and it drives."""
+    """Both wheels are online, reset is accepted, nothing moves without a command, and it drives."""
     heard = rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"] and s["bus"]["state"] == "active", seconds)
-    if not t.check(heard, f"heard again: {client.request('status')['bus']}"):
+    if not t.check(heard, f"online again: {client.request('status')['bus']}"):
         return
     wait_reset(t, client)
     t.arm(client)
@@ -56,7 +56,7 @@ def bus_off(t, off, on):
     t.check(client.request("status")["bus"]["state"] == "bus_off", f"bus {client.request('status')['bus']}")
     t.check(not client.request("reset")["ok"], "no reset while bus-off")
     t.check(any(e["event"] == "bus" and e["state"] == "bus_off" for e in observer.collect(0.1)), "the event comes")
-    t.check("bus-off" in rig.gateway.text().lower(), f"the log says bus-off: {rig.gateway.text()[-300:]}")
+    t.check("bus-off" in rig.gateway.text().lower(), f"the log reports bus-off: {rig.gateway.text()[-300:]}")
     on(rig)
     back_us = now_us()
     rig.note("alive")
@@ -133,7 +133,7 @@ def row16_bus_off_listening(t):
 
 
 def forged_end(t, forge):
-    """While the controller is off the bus, somebody on it claims that it is not."""
+    """While the controller is off the bus, another node sends error frames that report the opposite."""
     rig, client, stream = driving(t)
     begin_us = now_us()
     rig.sim.ask("busoff on")
@@ -143,7 +143,7 @@ def forged_end(t, forge):
     forge(rig)
     time.sleep(0.5)
     stream.stop()
-    t.check(client.request("status")["bus"]["state"] == "bus_off", f"not believed: {client.request('status')['bus']}")
+    t.check(client.request("status")["bus"]["state"] == "bus_off", f"the forged frames have no effect: {client.request('status')['bus']}")
     rig.sim.ask("busoff off")
     back_us = now_us()
     rig.note("alive")
@@ -152,7 +152,7 @@ def forged_end(t, forge):
     t.judge(rig)
 
 
-@scenario("bus-off, and forged error frames that tell of its end: not believed, and no send remains stalled", 10)
+@scenario("bus-off, and forged error frames that report its end: ignored, and no send remains stalled", 10)
 def row16_bus_off_forged_end(t):
     def forge(rig):
         for can_id, data in ((0x100, bytes(8)), (0x04, bytes([0, 0x40, 0, 0, 0, 0, 0, 0])), (0x04, bytes([0, 0x30, 0, 0, 0, 0, 0, 0]))):
@@ -161,7 +161,7 @@ def row16_bus_off_forged_end(t):
     forged_end(t, forge)
 
 
-@scenario("bus-off, and a forged error frame that tells of another one: no send remains stalled", 10)
+@scenario("bus-off, and a forged error frame that reports another one: no send remains stalled", 10)
 def row16_bus_off_forged_twice(t):
     forged_end(t, lambda rig: rig.bus.send(ERROR | 0x40, bytes(8)))
 
@@ -176,7 +176,7 @@ def row16_error_flood(t):
     error_flood(t, lambda rig, number: rig.sim.ask(f"passive {'off' if number % 2 else 'on'}"), tell("passive off"))
 
 
-# Row 17: nobody acknowledges, or the bus takes nothing -------------------------------------------------------------------
+# Row 17: no node acknowledges, or the bus accepts nothing ----------------------------------------------------------------
 
 
 def held_up(t, words, seconds, causes):
@@ -229,7 +229,7 @@ def forget(rig, can_id):
 @scenario("a babbling node with an id above 545 on a full bus: invariant 4 holds", 7, native="a flood")
 def row21_babble_high(t):
     rig, client = t.running()
-    driver = driving_process(t, rig)  # A process of its own: this one has 9000 frames a second to write down.
+    driver = driving_process(t, rig)  # In a separate process, because this one must record 9000 frames a second.
     rig.sim.ask("babble 600 100 on")
     time.sleep(3.0)
     load = client.request("status")["bus"]["load_permille"]

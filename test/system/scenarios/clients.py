@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Rows 1 to 4, 6, 7: clients that die, freeze, stop reading, compete, come back."""
+"""Rows 1 to 4, 6, 7: clients that are killed, freeze, stop reading, compete, reconnect."""
 
 import signal
 import socket
@@ -73,16 +73,16 @@ def row03_client_never_reads(t):
         observer.request("hello")
         worst_ms = max(worst_ms, (now_us() - asked_us) / 1000)
         time.sleep(0.05)
-    if t.check(dropped, "who does not take its replies is dropped in the end"):
-        # When that was only the gateway knows; the client sees it with its next command.
+    if t.check(dropped, "a client that does not read its replies is dropped in the end"):
+        # The client detects it only with its next command, so the exact time is not known here.
         rig.timeline.append(Event(observer.request("why")["at_us"], "gone"))
     t.check(worst_ms < 50, f"another client waited {worst_ms:.1f} ms for its answer", True)
     t.figure(f"others answered within {worst_ms:.1f} ms, dropped after {time.monotonic() - begin:.1f} s")
-    t.check(rig.wait_status(observer, lambda s: s["state"] == "listening", 5), "stopped and silent then")
+    t.check(rig.wait_status(observer, lambda s: s["state"] == "listening", 5), "stopped, then nothing is sent")
     t.judge(rig)
 
 
-@scenario("two clients: one owner, hand-over only at rest", 7)
+@scenario("two clients: one owner, the lease moves only at standstill", 7)
 def row04_two_clients(t):
     rig, first = t.running()
     first.name = "first"
@@ -94,14 +94,14 @@ def row04_two_clients(t):
     t.expect(second.drive(0, 0), "not_holder")
     refusal = second.arm()
     t.expect(refusal, "busy")
-    t.check("first" in refusal.get("message", ""), f"busy tells who: {refusal.get('message')}")
+    t.check("first" in refusal.get("message", ""), f"busy names the owner: {refusal.get('message')}")
     refusal = second.arm(takeover=True)
-    t.check(not refusal["ok"] and refusal["error"] in ("not_at_rest", "stale_command"), f"no hand-over in motion: {refusal}")
+    t.check(not refusal["ok"] and refusal["error"] in ("not_at_rest", "stale_command"), f"the lease does not move in motion: {refusal}")
     before = len([1 for _, _, speed in rig.bus.setpoints() if speed == 0])
     time.sleep(0.3)
     t.check(len([1 for _, _, speed in rig.bus.setpoints() if speed == 0]) == before, "the owner is undisturbed")
     stream.target = (0, 0)
-    t.check(rig.wait_status(second, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"] and s["left"]["applied_mm_s"] == 0, 4), "at rest")
+    t.check(rig.wait_status(second, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"] and s["left"]["applied_mm_s"] == 0, 4), "at standstill")
     time.sleep(0.6)
     t.arm(second, takeover=True)
     time.sleep(0.15)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Rows 5 and 33: observers that die, flood, connect a thousand times, use up descriptors and places."""
+"""Rows 5 and 33: observers that are killed, flood, connect a thousand times, use up descriptors and places."""
 
 import base64
 import contextlib
@@ -41,7 +41,7 @@ def read_some(sock, seconds=0.5):
         return b""
 
 
-@scenario("observers die, flood, connect 1000 times: the owner is undisturbed", 10, native=FLOOD)
+@scenario("observers are killed, flood, connect 1000 times: the owner is undisturbed", 10, native=FLOOD)
 def row05_many_observers(t):
     rig, owner = t.running()
     path = rig.path("gateway.sock")
@@ -58,7 +58,7 @@ def row05_many_observers(t):
     crowd = [connect(path) for _ in range(30)]
     time.sleep(0.2)
     refused = [sock for sock in crowd if b"too_many_clients" in read_some(sock, 0.3)]
-    t.check(len(refused) >= 14, f"{len(refused)} of 30 were told too_many_clients, at most 16 clients are allowed")
+    t.check(len(refused) >= 14, f"{len(refused)} of 30 received too_many_clients, at most 16 clients are allowed")
     for sock in crowd:
         sock.close()
     time.sleep(0.2)
@@ -94,7 +94,7 @@ def row05_out_of_descriptors(t):
     rig.start_gateway()
     owner = rig.client("owner")
     t.arm(owner)
-    limit = rig.gateway.descriptors() + ROOM  # How many it needs itself depends on the bus and the e-stop line.
+    limit = rig.gateway.descriptors() + ROOM  # The number that the gateway itself needs depends on the bus and the e-stop line.
     resource.prlimit(rig.gateway.child.pid, resource.RLIMIT_NOFILE, (limit, limit))
     stream = Streamer(owner, 200, 200)
     time.sleep(0.4)
@@ -107,24 +107,24 @@ def row05_out_of_descriptors(t):
         crowd.append(sock)
     time.sleep(0.2)
     t.check(rig.gateway.descriptors() >= limit - 1, f"{rig.gateway.descriptors()} of {limit} descriptors are in use")
-    t.check("there is no place for more" in rig.gateway.text(), "clients are turned away, and the log says so")
+    t.check("there is no place for more" in rig.gateway.text(), "clients are refused, and the log reports it")
     cpu, begin = rig.gateway.cpu_seconds(), time.monotonic()
     time.sleep(1.5)
     percent = 100 * (rig.gateway.cpu_seconds() - cpu) / (time.monotonic() - begin)
     t.check(percent < 50, f"{percent:.0f} % CPU while no descriptor is left", True)
-    t.figure(f"{percent:.0f} % CPU while starved of descriptors")
+    t.figure(f"{percent:.0f} % CPU without a free descriptor")
     for sock in crowd:
         sock.close()
     time.sleep(0.5)
     t.check(stream.stop() is None, f"the owner was refused: {stream.refusal}")
     late = rig.client("late")
     t.expect(late.request("hello"))
-    t.check(os.path.exists(rig.path("gateway.sock")), "the socket is still there")
+    t.check(os.path.exists(rig.path("gateway.sock")), "the socket still exists")
     time.sleep(0.4)
     t.judge(rig)
 
 
-@scenario("sixty observers that ask and watch without end: the e-stop does not wait for them", 14, native=FLOOD)
+@scenario("sixty observers that send requests and watch without end: the e-stop does not wait for them", 14, native=FLOOD)
 def row05_sixty_observers(t):
     rig = t.rig({"northbound": {"max_clients": 64}})
     rig.start_gateway()
@@ -169,7 +169,7 @@ LARGE = 8 << 20
 
 
 def read_recording(path, name, pieces, over):
-    """Reads it from begin to end, again and again, each piece as soon as the one before is there."""
+    """Reads it from begin to end, again and again, each piece as soon as the one before has arrived."""
     watcher = Client(path, name="reader")
     offset = 0
     while not over.is_set():
@@ -180,7 +180,7 @@ def read_recording(path, name, pieces, over):
         offset = (offset + len(data)) % piece["size"]
 
 
-@scenario("a crowd of watchers reads a large recording, asks and stops without end: no gap, and the stop counts", 12, native=FLOOD)
+@scenario("many watchers read a large recording, send requests and stop without end: no gap, and the stop counts", 12, native=FLOOD)
 def row05_watchers_and_recordings(t):
     rig = t.rig()
     rig.settings["northbound"].update(watch_socket=rig.path("watch.sock"), watch_group="none")
@@ -278,12 +278,12 @@ def stop_by(t, rig, path, verb):
     rig.timeline.append(Event(sent_us, verb, sent_us + 1000))
     reply = read_some(sock, 1)
     sock.close()
-    time.sleep(0.2)  # Until the bus's log has what followed.
+    time.sleep(0.2)  # Until the bus log contains the reaction.
     t.check(b'"ok":true' in reply, f"{verb} by {os.path.basename(path)}: {reply[:200]!r}")
     return sent_us
 
 
-@scenario("every place of both sockets taken: stop and estop are carried out within 60 ms, nobody is evicted", 25)
+@scenario("every place of both sockets taken: stop and estop are carried out within 60 ms, no client is evicted", 25)
 def row33_stop_never_refused(t):
     rig = t.rig()
     rig.settings["northbound"].update(watch_socket=rig.path("watch.sock"), watch_group="none", max_clients=PLACES)
@@ -303,7 +303,7 @@ def row33_stop_never_refused(t):
                     stream = Streamer(owner, 300, 300)
                     time.sleep(0.6)
                     sent_us = stop_by(t, rig, path, verb)
-                    slower = t.first_after(rig, sent_us, lambda mm_s: mm_s < 300, f"{verb} beside {kind}", STOP_MS)
+                    slower = t.first_after(rig, sent_us, lambda mm_s: mm_s < 300, f"{verb} next to {kind}", STOP_MS)
                     worst = max(worst, slower or 0)
                     stream.stop()
                     if verb == "estop":
@@ -314,7 +314,7 @@ def row33_stop_never_refused(t):
                 flood.kill()
                 flood.wait()
             still = sum(not _has_left(sock) for sock in crowd.socks)
-            t.check(kind == "poll" or still == len(crowd.socks), f"{still} of {len(crowd.socks)} kept their place")
+            t.check(kind == "poll" or still == len(crowd.socks), f"{still} of {len(crowd.socks)} are still connected")
             crowd.leave()
     t.figure(f"slower after {worst:.1f} ms at most")
     t.judge(rig)
@@ -360,12 +360,12 @@ def row33_iwheelctl_stops(t):
                 t.check(code == 0, f"{verb[0]} with {moved} away: {code}: {text!r}")
                 time.sleep(0.1)
                 stream.stop()
-                t.check(stream.refusal is not None, f"{verb[0]} with {moved} away stopped nobody")
+                t.check(stream.refusal is not None, f"{verb[0]} with {moved} away stopped no client")
                 if verb[0] == "estop":
                     time.sleep(1.2)
                     wait_reset(t, owner)
         code, text = call(rig, "iwheelctl", "--socket", rig.path("gateway.sock"), "status")
-        t.check(code == 1 and "too_many_clients" in text, f"what is no stop is refused: {code}: {text!r}")
+        t.check(code == 1 and "too_many_clients" in text, f"other requests are refused: {code}: {text!r}")
     finally:
         crowd.leave()
     t.judge(rig)

@@ -118,7 +118,7 @@ def two_contacts(t):
 
 
 def press_contact(t, rig, client, number):
-    """Arms, drives, presses one contact alone. Stopped, and told which one it is."""
+    """Arms, drives, presses one contact alone. The gateway stops and names the contact."""
     t.arm(client)
     stream = Streamer(client, 300, 300)
     time.sleep(0.4)
@@ -134,7 +134,7 @@ def press_contact(t, rig, client, number):
     t.expect(client.request("reset"), "estop_pressed")
 
 
-@scenario("two contacts: either stops at once, both must release", 8)
+@scenario("two contacts: either stops immediately, both must release", 8)
 def row11_two_contacts(t):
     rig, client = two_contacts(t)
     for number in (1, 2, 1, 2):
@@ -150,13 +150,13 @@ def row11_two_contacts(t):
     t.judge(rig, estop_limit_us=WORST_US)
 
 
-@scenario("two contacts, one stuck: told, and no reset until both were pressed, then released", 15)
+@scenario("two contacts, one stuck: reported, and no reset until both were pressed, then released", 15)
 def row13_contact_stuck(t):
     rig, client = two_contacts(t)
     for number in (1, 2):
         press_contact(t, rig, client, number)
         told = rig.wait_status(client, lambda s: s["estop"]["state"] == "disagrees", 3)
-        t.check(told and "estop_disagrees" in told["present"], f"told: {told and told['present']}")
+        t.check(told and "estop_disagrees" in told["present"], f"reported: {told and told['present']}")
         rig.sim.ask(f"contact {number} release")
         time.sleep(1.2)
         t.expect(client.request("reset"), "cause_present")
@@ -165,7 +165,7 @@ def row13_contact_stuck(t):
         rig.sim.ask(f"contact {3 - number} release")
         time.sleep(0.1)
         t.expect(client.request("reset"), "cause_present")
-        t.rule(client.request("status")["state"] == "latched", "latched all the while")
+        t.rule(client.request("status")["state"] == "latched", "latched during all of this")
         rig.press()
         time.sleep(0.1)
         t.check(not client.request("reset")["ok"], "no reset while both are pressed")
@@ -187,7 +187,7 @@ def row29_contact_twice(t):
     t.check("line and line2 are both" in done.stderr and "gateway.conf:" in done.stderr, f"names the keys: {done.stderr}")
 
 
-@scenario("reset says why not: pressed, moving, commanded, just happened", 6)
+@scenario("reset names the reason of a refusal: pressed, moving, commanded, just happened", 6)
 def reset_refusals(t):
     rig, client = t.running()
     t.arm(client)
@@ -206,18 +206,18 @@ def reset_refusals(t):
     t.judge(rig)
 
 
-@scenario("software e-stop by somebody without the lease", 5)
+@scenario("software e-stop by a client without the lease", 5)
 def software_estop(t):
     rig, owner = t.running()
     t.arm(owner)
     stream = Streamer(owner, 400, 400)
     time.sleep(0.6)
     guard = rig.client("guard")
-    t.expect(guard.request("estop", reason="somebody in the way"))
+    t.expect(guard.request("estop", reason="a person in the way"))
     time.sleep(0.1)
     stream.stop()
     why = t.stopped_by(guard, "estop_software")
-    t.check("somebody in the way" in why["sentence"], f"why tells the reason: {why['sentence']}")
+    t.check("a person in the way" in why["sentence"], f"why has the reason: {why['sentence']}")
     reset(t, guard)
     t.check(guard.request("status")["state"] == "listening", "reset leads to listening")
     time.sleep(0.3)
@@ -225,7 +225,7 @@ def software_estop(t):
 
 
 class Button:
-    """A button process of our own, to let it die."""
+    """A button process of the test, which can be killed."""
 
     def __init__(self, path):
         self.path = path
@@ -257,7 +257,7 @@ class Button:
             connection.close()
 
 
-@scenario("the button's process dies: pressed; it comes back: reset needed", 6)
+@scenario("the button's process ends: pressed; it returns: reset needed", 6)
 def row14_button_dies(t):
     rig = t.rig()
     rig.button = "own-button"
@@ -275,7 +275,7 @@ def row14_button_dies(t):
     t.stopped_by(client, "estop_line")
     cpu, begin = rig.gateway.cpu_seconds(), time.monotonic()
     time.sleep(1.0)
-    t.check((rig.gateway.cpu_seconds() - cpu) / (time.monotonic() - begin) < 0.5, "no busy loop while the button is gone", True)
+    t.check((rig.gateway.cpu_seconds() - cpu) / (time.monotonic() - begin) < 0.5, "no busy loop without a button", True)
     t.expect(client.request("reset"), "estop_pressed")
     button.open()
     t.check(rig.wait_status(client, lambda s: s["estop"]["state"] == "released", 3), "found again")
@@ -283,7 +283,7 @@ def row14_button_dies(t):
     reset(t, client)
     button.die()
     time.sleep(0.2)
-    t.check(client.request("status")["state"] == "latched", "gone while listening latches too")
+    t.check(client.request("status")["state"] == "latched", "a button that disappears while listening latches too")
     t.judge(rig)
 
 
@@ -294,8 +294,8 @@ def no_estop_line(t):
     client = rig.client()
     reply = t.arm(client)
     t.check(any("e-stop" in warning or "estop" in warning for warning in reply.get("warnings", [])), f"arm warns: {reply.get('warnings')}")
-    t.check(client.request("status")["estop"]["state"] == "none", "status says none")
-    t.check("e-stop" in rig.gateway.text().lower(), "the start says so")
+    t.check(client.request("status")["estop"]["state"] == "none", "status reports none")
+    t.check("e-stop" in rig.gateway.text().lower(), "the log reports it at start")
     t.drive_for(client, 200, 200, 0.5)
     client.request("stop")
     time.sleep(0.4)

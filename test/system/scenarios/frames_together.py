@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Frames that nobody watches are taken together; as soon as somebody does, each wakes the gateway."""
+"""Frames without a watcher are read together; with a watcher, each frame wakes the gateway."""
 
 import time
 
@@ -8,8 +8,8 @@ from scenario import scenario
 
 WATCHED_S = 1.5
 TOGETHER = 0.6  # wakes for a frame, at most: three frames of the wheels fall into 6 ms
-DRIVING = 0.9  # the same while driving: looks every 3 ms, pairs, their echoes, commands
-STEPS_hz = 70  # one each period of 20 ms, and some for what is kept
+DRIVING = 0.9  # the same while driving: polls every 3 ms, pairs, their echoes, commands
+STEPS_hz = 70  # one each period of 20 ms, and some for the recording
 APART = 1.5  # times as many as that for a client that watches them, at least
 
 
@@ -25,19 +25,19 @@ def wakes_per_frame(rig):
     return slept / max(frames, 1), frames
 
 
-@scenario("frames are taken together, while driving too; for a client that watches them each wakes the gateway", 10)
+@scenario("frames are read together, while driving too; with a client that watches them, each wakes the gateway", 10)
 def frames_taken_together(t):
     rig, client = t.running()
     client.close()
     time.sleep(0.3)
     alone, frames = wakes_per_frame(rig)
     t.check(frames > 300 * WATCHED_S, f"{frames} frames of telemetry in {WATCHED_S} s")
-    t.check(alone <= TOGETHER, f"{alone:.2f} wakes for a frame that nobody waits for")
+    t.check(alone <= TOGETHER, f"{alone:.2f} wakes for a frame without a watcher")
     client = rig.client()
     received = client.request("status")["counters"]["received"]
     t.check(received > frames, f"{received} frames received, {frames} were on the bus")
     beside, _ = wakes_per_frame(rig)
-    t.check(beside <= TOGETHER, f"{beside:.2f} wakes for a frame beside a client that does not watch them")
+    t.check(beside <= TOGETHER, f"{beside:.2f} wakes for a frame with a client that does not watch them")
     t.arm(client)
     since_us, before = now_us(), wakes(rig.gateway)
     t.drive_for(client, 200, 200, WATCHED_S)
@@ -45,14 +45,14 @@ def frames_taken_together(t):
     t.check(driving <= DRIVING, f"{driving:.2f} wakes for a frame while driving")
     client.request("watch", topics=["frame"])
     watched, _ = wakes_per_frame(rig)
-    t.check(watched >= APART * alone, f"{watched:.2f} wakes for a frame beside a client that watches them, {alone:.2f} without", timing=True)
+    t.check(watched >= APART * alone, f"{watched:.2f} wakes for a frame with a client that watches them, {alone:.2f} without", timing=True)
     t.figure(f"{alone:.2f} wakes for a frame, {driving:.2f} while driving, {watched:.2f} watched")
     client.request("stop")
     t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 4), "silence")
     t.judge(rig)
 
 
-@scenario("without a client and with a silent bus the gateway sleeps", 4)
+@scenario("without a client and without frames the gateway sleeps", 4)
 def frames_none(t):
     rig, client = t.running()
     client.close()

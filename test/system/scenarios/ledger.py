@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The assumption ledger: what the bus shows, what the operator says, what a contradiction disables."""
+"""The assumption store: what the bus shows, what the operator confirms, what a contradiction disables."""
 
 import time
 
@@ -9,7 +9,7 @@ from .bus_faults import wait_reset
 from .wheels import fault_while_driving
 
 
-@scenario("confirm: the operator's word confirms, contradicts, and moves nothing", 4)
+@scenario("confirm: the operator confirms or contradicts, and nothing moves", 4)
 def confirm_by_the_operator(t):
     rig, client = t.running()
     reply = client.request("confirm", item="wheel_radius", value=192)
@@ -25,13 +25,13 @@ def confirm_by_the_operator(t):
     t.expect(client.request("confirm", item="mount_sign_left"))
     ledger = client.request("status")["ledger"]
     t.check(ledger["wheel_radius"]["state"] == "confirmed", "the radius stays confirmed after a refused value")
-    t.rule(not rig.bus.setpoints(), "nothing of that sends anything")
+    t.rule(not rig.bus.setpoints(), "none of these requests sends a setpoint")
     t.arm(client)
     t.drive_for(client, 150, 150, 0.3)
     t.judge(rig)
 
 
-@scenario("confirm: how it was found is told and kept; a contradicted track refuses turns, and nothing else", 6)
+@scenario("confirm: how it was found is reported and stored; a contradicted track refuses turns, and nothing else", 6)
 def confirm_how_and_track(t):
     rig, client = t.running({"wheels": {"track_mm": 540}})
     entry = client.request("status")["ledger"]["track"]
@@ -41,11 +41,11 @@ def confirm_how_and_track(t):
     t.check(
         (reply["state"], reply["evidence"], reply["how"], reply["reason"])
         == ("confirmed", "operator", "bringup: 3 full turns by hand", "found by bringup: 3 full turns by hand"),
-        f"it keeps its evidence: {reply}",
+        f"its source is stored: {reply}",
     )
     t.check("assumption track = 540 is confirmed by the operator: found by bringup" in rig.gateway.text(), "in the log")
     reply = client.request("confirm", item="track")
-    t.check(reply["how"] == "bringup: 3 full turns by hand", f"said once more, it keeps its evidence: {reply}")
+    t.check(reply["how"] == "bringup: 3 full turns by hand", f"confirmed once more, its source is still stored: {reply}")
     reply = client.request("confirm", item="track", value=600, how="a tape")
     t.check(reply["state"] == "contradicted" and "track_mm" in reply["disabled"], f"contradicted: {reply}")
     t.arm(client)
@@ -56,14 +56,14 @@ def confirm_how_and_track(t):
     t.expect(turn, "denied")
     t.check("the operator found 600 by a tape" in turn["message"] and "track_mm" in turn["message"], f"why: {turn}")
     client.request("stop")
-    t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 5), "at rest")
+    t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 5), "at standstill")
     client.request("twist", v_mm_s=0, yaw_mrad_s=300)
     t.expect(client.arm(), "stale_command")
     t.expect(client.request("confirm", item="track"))
     t.judge(rig)
 
 
-@scenario("a wheel against its command: contradicted, and no arm until the operator says so", 7)
+@scenario("a wheel against its command: contradicted, and no arm until the operator confirms it", 7)
 def contradicted_sign_refuses_arm(t):
     rig, client, _ = fault_while_driving(t, "sign both swapped", "feedback_sign", 420)
     rig.sim.ask("sign both normal")
@@ -82,11 +82,11 @@ def contradicted_sign_refuses_arm(t):
     t.judge(rig)
 
 
-@scenario("driving shows gear ratio, byte order, type and signs; nothing but the operator shows the rest", 12)
+@scenario("driving shows gear ratio, byte order, type and signs; only the operator confirms the rest", 12)
 def ledger_by_driving(t):
     rig, client = t.running()
     client.request("watch", topics=["state"], rate_hz=1)
-    time.sleep(2.6)  # Two seconds at rest first: units and offset.
+    time.sleep(2.6)  # Two seconds at standstill first: units and offset.
     t.arm(client)
     t.drive_for(client, 500, 400, 4.5)
     status = client.request("status")
@@ -105,12 +105,12 @@ def ledger_by_driving(t):
         t.check(states[item] == ("confirmed", "bus"), f"{item}: {status['ledger'][item]}")
     for item in ("current_role", "mount_sign_left", "mount_sign_right", "wheel_radius"):
         t.check(states[item][0] == "assumed", f"{item}: {status['ledger'][item]}")
-    t.check(client.wait_event("ledger", item="gear_ratio", state="confirmed"), "watchers of state are told")
+    t.check(client.wait_event("ledger", item="gear_ratio", state="confirmed"), "watchers of state receive an event")
     client.request("stop")
     t.judge(rig)
 
 
-@scenario("another gear, another byte order, other lengths: contradicted, and what rests on it is not told", 22)
+@scenario("another gear, another byte order, other lengths: contradicted, and values that depend on it are not reported", 22)
 def ledger_contradicted_by_driving(t):
     rig = t.rig()
     for command in ("gear both 3", "pose reversed", "padding on"):
@@ -126,8 +126,8 @@ def ledger_contradicted_by_driving(t):
         t.check(f"assumption {item} = " in rig.gateway.text(), f"{item} is in the log")
     for side in ("left", "right"):
         t.check(status[side]["distance_mm"] is None, f"no {side} distance: {status[side]['distance_mm']}")
-        t.check(status[side]["speed_mm_s"] is not None, "the speed does not rest on the gear: rpm are the wheel's")
-        t.check(status[side]["ticks"] is not None, "ticks are what they are")
+        t.check(status[side]["speed_mm_s"] is not None, "the speed does not depend on the gear ratio: rpm are the wheel's")
+        t.check(status[side]["ticks"] is not None, "ticks are reported unchanged")
     t.check(status["pose"]["x_mm"] is None, f"no pose: {status['pose']}")
     t.check(status["state"] == "armed", "driving goes on")
     time.sleep(0.1)
@@ -164,7 +164,7 @@ def tare_refused_with_the_reason(t):
     rig.sim.ask("raw left 32767")
     time.sleep(2.6)
     refused("denied", "end of its range")
-    t.check(client.request("status")["left"]["force_validity"] == "saturated", "saturated is told")
+    t.check(client.request("status")["left"]["force_validity"] == "saturated", "saturated is reported")
     rig.sim.ask("raw left auto")
     rig.sim.ask("zero left 12.3")
     time.sleep(2.6)

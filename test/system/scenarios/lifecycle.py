@@ -77,7 +77,7 @@ def hold_until_release(t):
     time.sleep(0.2)
     begin_us = now_us()
     time.sleep(1)
-    t.check(not rig.bus.setpoints(begin_us), "silence after release")
+    t.check(not rig.bus.setpoints(begin_us), "nothing is sent after release")
     t.check(client.request("status")["state"] == "listening", "and it listens")
 
 
@@ -102,7 +102,7 @@ def row25_restart_beside_other_master(t):
     pause.stop()
     sent = rig.bus.setpoints(begin_us)
     span_ms = (sent[-1][0] - sent[0][0]) / 1000 if sent else 0
-    t.check(span_ms < 200, f"hearing another master it falls silent; it sent for {span_ms:.0f} ms")
+    t.check(span_ms < 200, f"it stops sending when it receives another master's frames; it sent for {span_ms:.0f} ms")
     t.rule(not any(speed for _, _, speed in sent), "and nothing but zeros")
     t.figure(f"{len(sent)} zero frames in {span_ms:.0f} ms")
 
@@ -175,10 +175,10 @@ def listen_only(t):
     time.sleep(0.2)
     rig.press()
     time.sleep(0.5)
-    t.check(client.request("status")["listen_only"] is True, "status says so")
+    t.check(client.request("status")["listen_only"] is True, "status reports it")
     t.rule(not rig.bus.setpoints(), "nothing is sent")
     rig.gateway.signal(signal.SIGTERM)
-    t.check(rig.gateway.wait(3) == 0, "ends at once")
+    t.check(rig.gateway.wait(3) == 0, "ends immediately")
     t.judge(rig, moves=False)
 
 
@@ -200,7 +200,7 @@ def row30_two_gateways(t):
     for extra in ((), ("--socket", rig.path("other.sock")), ("--socket", rig.path("elsewhere/gateway.sock"))):
         code, text = second_gateway(t, rig, *extra)
         t.check(code == 69, f"exit code {code} with {extra}: {text[-200:]}")
-        t.check("gateway" in text and len(text) > 40, f"it says why: {text[-200:]}")
+        t.check("gateway" in text and len(text) > 40, f"it prints the reason: {text[-200:]}")
         t.check(str(rig.gateway.child.pid) in text, f"it names the process: {text[-200:]}")
     t.check(os.path.exists(rig.path("gateway.sock")), "the first one's socket is still there")
     t.check(stream.stop() is None, f"the first one drives on: {stream.refusal}")

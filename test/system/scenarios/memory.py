@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What is known of the wheels is kept over restarts; a file that is not to be trusted is told and ignored."""
+"""Results about the wheels are stored over restarts; the gateway reports and ignores a file that it must not trust."""
 
 import glob
 import json
@@ -47,7 +47,7 @@ def keeper_of(gateway):
     return children(gateway.child.pid)["iwheel-keeper"]
 
 
-@scenario("a tare and the operator's word survive kill -9, and nothing moves the zero afterwards", 16)
+@scenario("a tare and the operator's confirmation survive kill -9, and nothing changes the zero afterwards", 16)
 def memory_survives_a_crash(t):
     rig, client = t.running()
     time.sleep(QUIET_S)
@@ -58,20 +58,20 @@ def memory_survives_a_crash(t):
     t.check(before["left"]["offset_samples"] == 40 and before["left"]["offset_contaminated"] is False, "quality of the tare")
     t.check(written(rig, '"operator"') and written(rig, '"left"'), "it is on the disk")
     time.sleep(1.3)
-    rig.sim.ask("load left 15")  # As heavy as an estimate would swallow.
+    rig.sim.ask("load left 15")  # Light enough for an estimate to accept it as the offset.
     client = restart(rig, signal.SIGKILL)
     status = answered(rig, client)
-    if not t.check(status, "the memory is read"):
+    if not t.check(status, "the stored results are read"):
         return
     t.check(status["memory"]["state"] == "kept", f"memory {status['memory']}")
     for item in ("wheel_radius", "mount_sign_left"):
         entry = status["ledger"][item]
         t.check((entry["state"], entry["evidence"]) == ("confirmed", "operator"), f"{item}: {entry}")
-    t.check(status["ledger"]["mount_sign_right"]["state"] == "assumed", "nobody confirmed the other wheel")
+    t.check(status["ledger"]["mount_sign_right"]["state"] == "assumed", "the other wheel is not confirmed")
     time.sleep(QUIET_S)
     left = client.request("status")["left"]
     t.check(left["force_offset_mN"] == before["left"]["force_offset_mN"], f"the zero did not move: {left['force_offset_mN']} mN")
-    t.check((left["offset_provenance"], left["offset_origin"]) == ("stored", "operator"), "and says where it comes from")
+    t.check((left["offset_provenance"], left["offset_origin"]) == ("stored", "operator"), "and its origin is reported")
     t.check(left["offset_age_ms"] is not None and 2000 < left["offset_age_ms"] < 60000, f"and how old it is: {left['offset_age_ms']}")
     t.check(12_000 < (left["force_net_mN"] or 0) < 18_000, f"15 N show as {left['force_net_mN']} mN")
     rig.sim.ask("reboot left")
@@ -83,13 +83,13 @@ def memory_survives_a_crash(t):
     time.sleep(QUIET_S)
     client.request("watch", topics=["force"], rate_hz=1)
     t.expect(client.request("tare", side="left"))
-    t.check(client.wait_event("offset", side="left", provenance="operator"), "a new tare is told by an event")
+    t.check(client.wait_event("offset", side="left", provenance="operator"), "a new tare is reported by an event")
     t.check("left force offset: " in rig.gateway.text() and "before: " in rig.gateway.text(), "and in the log")
     t.rule(not rig.bus.setpoints(), "nothing of that sends anything")
     t.judge(rig, moves=False)
 
 
-@scenario("evidence for another configuration is forgotten, and that is told", 14)
+@scenario("results for another configuration are dropped, and this is reported", 14)
 def memory_of_another_configuration(t):
     rig, client = t.running()
     time.sleep(QUIET_S)
@@ -105,12 +105,12 @@ def memory_of_another_configuration(t):
     t.check(status["ledger"]["wheel_radius"]["state"] == "assumed", "the radius is open again")
     t.check(status["left"]["offset_origin"] != "operator", "a tare in another unit is no zero")
     log = rig.gateway.text()
-    t.check("wheel_radius: the stored result was for 192, and 180 is configured now: dropped" in log, "told: radius")
-    t.check("stored force offset was measured in another force_unit: dropped" in log, "told: offset")
+    t.check("wheel_radius: the stored result was for 192, and 180 is configured now: dropped" in log, "reported: radius")
+    t.check("stored force offset was measured in another force_unit: dropped" in log, "reported: offset")
     t.judge(rig, moves=False)
 
 
-@scenario("a contradiction stays over a restart, until the operator settles it", 16)
+@scenario("a contradiction stays over a restart, until the operator resolves it", 16)
 def memory_of_a_contradiction(t):
     rig = t.rig()
     rig.sim.ask("unit left dN")
@@ -121,7 +121,7 @@ def memory_of_a_contradiction(t):
     t.check(written(rig, '"contradicted"'), "written")
     rig.kill_gateway(signal.SIGTERM)
     rig.sim.end()
-    rig.sim = type(rig.sim)(rig, ("--uptime", "100"))  # No offset frames any more: nothing to find it out by again.
+    rig.sim = type(rig.sim)(rig, ("--uptime", "100"))  # No offset frames any more, so the gateway cannot find it again.
     rig.bus = rig.listen(rig.bus.frames)
     rig.sim.ask("unit left dN")
     rig.start_gateway()
@@ -130,11 +130,11 @@ def memory_of_a_contradiction(t):
     status = client.request("status")
     left = status["left"]
     t.check((left["force_validity"], left["force_net_mN"]) == ("unit_contradicted", None), f"still no net force: {left['force_validity']}")
-    t.check("raw / offset is" in status["ledger"]["force_unit_left"]["reason"], "with the evidence")
-    t.check("force_unit_left = cN is contradicted by the bus" in rig.gateway.text(), "told at start")
+    t.check("raw / offset is" in status["ledger"]["force_unit_left"]["reason"], "with the reason")
+    t.check("force_unit_left = cN is contradicted by the bus" in rig.gateway.text(), "reported at start")
     t.expect(client.request("confirm", item="force_unit_left"))
     left = client.request("status")["left"]
-    t.check(left["force_validity"] == "valid" and left["force_net_mN"] is not None, f"settled: {left['force_validity']}")
+    t.check(left["force_validity"] == "valid" and left["force_net_mN"] is not None, f"resolved: {left['force_validity']}")
     t.judge(rig, moves=False)
 
 
@@ -163,13 +163,13 @@ def forge(path):
 
 
 def settled(path):
-    """Waits for the process that keeps the file: it outlives the gateway by its last write."""
+    """Waits for the process that writes the file: it ends after its last write, later than the gateway."""
     seen = None
     while seen != (seen := os.stat(path).st_mtime_ns):
         time.sleep(0.5)
 
 
-@scenario("a damaged, foreign or forged file is told, ignored and set aside", 24)
+@scenario("a damaged, foreign or forged file is reported, ignored and set aside", 24)
 def memory_that_is_not_to_be_trusted(t):
     rig, client = t.running()
     for spoil, fault in ((damage, "it is damaged"), (replace, "it is damaged"), (forge, "it contains values that no gateway can have measured")):
@@ -186,36 +186,36 @@ def memory_that_is_not_to_be_trusted(t):
         client = rig.client()
         answered(rig, client)
         status = client.request("status")
-        t.check(status["ledger"]["wheel_radius"]["state"] == "assumed", "nothing of it is believed")
-        t.check(f"{path} is ignored: {fault}" in rig.gateway.text(), "the log tells")
+        t.check(status["ledger"]["wheel_radius"]["state"] == "assumed", "nothing of it is used")
+        t.check(f"{path} is ignored: {fault}" in rig.gateway.text(), "the log reports it")
         with open(path + ".damaged", "rb") as file:
             t.check(file.read() == spoilt, "the file is set aside as it was")
         t.expect(client.request("confirm", item="mount_sign_left"))
-        t.check(written(rig, '"mount_sign_left"'), "and a new one is kept")
+        t.check(written(rig, '"mount_sign_left"'), "and a new one is written")
         time.sleep(0.3)
         memory = client.request("status")["memory"]
-        t.check(memory["state"] == "ignored" and fault in memory["reason"], f"which is not forgotten then: {memory}")
+        t.check(memory["state"] == "ignored" and fault in memory["reason"], f"and still reported then: {memory}")
     t.judge(rig, moves=False)
 
 
-@scenario("nowhere to keep it: told once, and taken up when there is; a dead keeper holds up nothing", 14)
+@scenario("no place to store it: reported once, stored when there is one; nothing waits for a writing process that was killed", 14)
 def memory_without_a_place(t):
     rig = t.rig()
     place = rig.path("place")
     folder = os.path.join(place, "records")
     with open(place, "w", encoding="ascii"):
-        pass  # A file where a directory should be: nobody can make the other one in it.
+        pass  # A file in place of a directory, so the gateway cannot make its file in it.
     rig.settings["record"] = {"directory": folder}
     rig.write_config()
     rig.start_gateway()
     client = rig.client()
     status = answered(rig, client)
     t.check(status["memory"]["state"] == "failed" and status["memory"]["reason"], f"memory {status['memory']}")
-    t.check("set [record] directory" in rig.gateway.text(), "the log tells cause and cure")
+    t.check("set [record] directory" in rig.gateway.text(), "the log has cause and fix")
     t.expect(client.request("confirm", item="wheel_radius"))
     os.remove(place)
     os.makedirs(folder)
-    t.check(written(rig, '"wheel_radius"', 13), "kept as soon as there is a place")
+    t.check(written(rig, '"wheel_radius"', 13), "stored as soon as there is a place")
     t.arm(client)
     stream = Streamer(client, 300, 300, 0.02)
     time.sleep(0.5)
@@ -224,8 +224,8 @@ def memory_without_a_place(t):
     time.sleep(1.5)
     stream.stop()
     status = client.request("status")
-    t.check(status["memory"]["state"] == "failed", f"a dead keeper is told: {status['memory']}")
-    t.check(status["ledger"]["mount_sign_left"]["state"] == "confirmed", "what is known stays known in this run")
+    t.check(status["memory"]["state"] == "failed", f"the end of the writing process is reported: {status['memory']}")
+    t.check(status["ledger"]["mount_sign_left"]["state"] == "confirmed", "stored results stay valid in this run")
     t.check(rig.gateway.text().count("are not stored in") == 2, "each once")
     client.request("stop")
     t.judge(rig)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Rows 24, 26 and 27: a gateway whose process stands still, sleeps, is stuck, or cannot write its log."""
+"""Rows 24, 26 and 27: a gateway whose process is stopped, suspended or stuck, or cannot write its log."""
 
 import contextlib
 import fcntl
@@ -36,7 +36,7 @@ def driving(t, config=None, speed=300, **options):
 
 
 def from_zero(t, rig, back_us, what):
-    """Checks what left after the process came back: zeros, without a burst."""
+    """Checks what was sent after the process continued: zeros, without a burst."""
     sent = [(at, value) for at, _, value in rig.bus.setpoints(back_us) if at < back_us + 300_000]
     first = [value for _, value in sent[:2]]
     t.check(first and not any(first), f"{what}, its first pair is zero: {first}")
@@ -47,7 +47,7 @@ def from_zero(t, rig, back_us, what):
 
 
 def stop_process(t, seconds):
-    """The gateway's process stands still in motion for that long (SIGSTOP), while its client drives on."""
+    """The gateway's process is stopped in motion for that long (SIGSTOP), while its client drives on."""
     rig, client, stream = driving(t, {"drive": {"lease_ms": 500, "accel_mm_s2": 2000, "decel_mm_s2": 5000}}, speed=500)
     client.timeout = seconds + 3
     rig.note("cut", within_us=int(seconds * 1e6) + 60_000)
@@ -74,10 +74,10 @@ for duration in STOPS_S:
         stop_process(t, duration)
 
     stopped.__name__ = f"row24_stopped_{int(duration * 1000)}_ms"
-    scenario(f"the gateway's process stands still for {duration} s: from zero, with a fresh command", 6)(stopped)
+    scenario(f"the gateway's process is stopped for {duration} s: from zero, with a fresh command", 6)(stopped)
 
 
-@scenario("the gateway's process stands still for 70 ms: it drives on without a burst", 4)
+@scenario("the gateway's process is stopped for 70 ms: it drives on without a burst", 4)
 def row24_stopped_70_ms(t):
     rig, client, stream = driving(t)
     rig.gateway.signal(signal.SIGSTOP)
@@ -146,13 +146,13 @@ def stuck(t, where):
     t.check(any(word == "READY=1" for _, word in words), f"it reports that it is ready: {words[:3]}")
     fed = [at for at, word in words if word == "WATCHDOG=1"]
     gap_ms = max((b - a for a, b in itertools.pairwise(fed)), default=10**9) / 1000
-    t.check(gap_ms < WATCHDOG_MS, f"while all is well the watchdog is fed every {gap_ms:.0f} ms", True)
+    t.check(gap_ms < WATCHDOG_MS, f"without a fault the watchdog is fed every {gap_ms:.0f} ms", True)
     order(rig, where)
     stuck_us = now_us()
     rig.timeline.append(Event(stuck_us + SEEN_US, "end"))
     late = [at for at, word in watchdog.receive(WATCHDOG_MS * 2.5 / 1000) if at > stuck_us + SEEN_US]
     t.check(not late, f"stuck, it feeds the watchdog no more: {len(late)} times")
-    t.check(rig.gateway.child.poll() is None, "its process is alive all the same")
+    t.check(rig.gateway.child.poll() is None, "its process still runs")
     rig.gateway.signal(signal.SIGABRT)
     rig.gateway.wait(3)
     stream.stop()

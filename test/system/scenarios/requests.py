@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Rows 8 to 10: lines that are too long, too odd, or out of range."""
+"""Rows 8 to 10: lines that are too long, invalid, or out of range."""
 
 import time
 
@@ -32,7 +32,7 @@ def row08_endless_lines(t):
             reply = client.read_reply()
             t.check(reply and reply.get("error") == "line_too_long", f"line_too_long expected, got {reply}")
         except Closed:
-            t.check(False, "closed without saying why")
+            t.check(False, "closed without a reason")
         t.check(closed_after(client), "the connection is closed")
     client = rig.client()
     for byte in b'{"cmd":"hello","id":5}\n':

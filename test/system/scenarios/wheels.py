@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Row 22 and the wheel's part of row 23: wheels that fall silent or do not do what they are told."""
+"""Row 22 and the wheel's part of row 23: wheels that go offline or do not follow their commands."""
 
 import time
 
@@ -25,24 +25,24 @@ def fault_while_driving(t, command, cause, within_ms, speed=400, **expected):
     t.figure(f"reaction after {ms or 0:.0f} ms")
     why = t.stopped_by(client, cause, expected.get("state", "latched"))
     side = expected.get("side")
-    t.check(side is None or why["side"] == side, f"side {side} expected, why says {why['side']}")
+    t.check(side is None or why["side"] == side, f"side {side} expected, why has {why['side']}")
     return rig, client, why
 
 
-@scenario("left wheel silent", 6)
+@scenario("left wheel offline", 6)
 def row22_left_silent(t):
     rig, client, _ = fault_while_driving(t, "mute left", "wheel_lost", 80, kind="ramp", side="left")
-    t.check(not client.request("reset")["ok"], "no reset while it is silent")
+    t.check(not client.request("reset")["ok"], "no reset while it is offline")
     rig.sim.ask("unmute left")
     wait_reset(t, client)
     t.judge(rig)
 
 
-@scenario("both wheels silent", 6)
+@scenario("both wheels offline", 6)
 def row22_both_silent(t):
-    rig, client, _ = fault_while_driving(t, "mute both", "wheel_lost", 80)  # which side is named is a matter of microseconds
+    rig, client, _ = fault_while_driving(t, "mute both", "wheel_lost", 80)  # microseconds decide which side is named
     status = client.request("status")
-    t.check(not status["left"]["heard"] and not status["right"]["heard"], "neither is heard")
+    t.check(not status["left"]["heard"] and not status["right"]["heard"], "both are offline")
     rig.sim.ask("unmute both")
     wait_reset(t, client)
     t.judge(rig)
@@ -56,7 +56,7 @@ def row22_sign_swapped(t):
     t.judge(rig)
 
 
-@scenario("both wheels faster than told", 6)
+@scenario("both wheels faster than commanded", 6)
 def row22_overspeed(t):
     rig, client, _ = fault_while_driving(t, "runaway both on", "overspeed", 3000)
     t.check(not client.request("reset")["ok"], "no reset while they turn")
@@ -74,32 +74,32 @@ def row22_blocked(t):
 
 
 def alone(t, fault, cure, within_ms, kind):
-    """The right wheel alone does something else: the pair stops, and does not latch."""
+    """The right wheel alone does not follow its command: the pair stops, and does not latch."""
     rig, client, why = fault_while_driving(t, fault, "pair_diverges", within_ms, kind=kind, state="stopping", side="right")
     rig.sim.ask(cure)
     largest = client.request("status")["pair"]
-    t.check(largest["largest_mm"] >= largest["limit_mm"], f"the deviation is told: {largest}, {why['sentence']}")
+    t.check(largest["largest_mm"] >= largest["limit_mm"], f"the deviation is reported: {largest}, {why['sentence']}")
     t.figure(f"{why['detail']} mm from its path")
     t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 4), "listening again without reset")
     t.judge(rig)
 
 
-@scenario("one wheel blocked: zero at once, not latched", 7)
+@scenario("one wheel blocked: zero immediately, not latched", 7)
 def row31_blocked(t):
     alone(t, "block right", "unblock right", 300, "cut")
 
 
-@scenario("one wheel reversed: zero at once, not latched", 7)
+@scenario("one wheel reversed: zero immediately, not latched", 7)
 def row31_reversed(t):
     alone(t, "sign right swapped", "sign right normal", 300, "cut")
 
 
-@scenario("one wheel slow: zero at once, not latched", 7)
+@scenario("one wheel slow: zero immediately, not latched", 7)
 def row31_slow(t):
     alone(t, "droop right 70", "droop right 0", 500, "cut")
 
 
-@scenario("one wheel faster than told: ramp, not latched", 7)
+@scenario("one wheel faster than commanded: ramp, not latched", 7)
 def row31_fast(t):
     alone(t, "runaway right on 250", "runaway right off", 800, "ramp")
 
@@ -129,7 +129,7 @@ def trap07_reboot_while_driving(t):
     t.arm(client)
     stream = Streamer(client, 300, 300)
     time.sleep(0.9)
-    rig.fault("reboot right", "ramp", within_ms=80)  # Silent at first: one wheel offline.
+    rig.fault("reboot right", "ramp", within_ms=80)  # At first it sends nothing: one wheel offline.
     time.sleep(0.4)
     stream.stop()
     status = client.request("status")
@@ -191,13 +191,13 @@ def row23_extremes(t):
     t.judge(rig)
 
 
-@scenario("gateway started when the wheels no longer tell their offset: own estimate, and said so", 9)
+@scenario("gateway started when the wheels no longer send their offset: own estimate, and reported as such", 9)
 def row23_late_start(t):
     rig = t.rig(sim_args=("--uptime", "100"))
     rig.start_gateway()
     client = rig.client()
     status = rig.wait_status(client, lambda s: s["left"]["offset_provenance"] != "none", 6)
-    t.check(status, f"not waiting for ever: {force_of(client, 'left')['offset_provenance']}")
+    t.check(status, f"it does not wait for ever: {force_of(client, 'left')['offset_provenance']}")
     for side in ("left", "right"):
         force = force_of(client, side)
         t.check(force["offset_provenance"] == "estimated", f"{side}: offset {force['offset_provenance']}")
@@ -208,7 +208,7 @@ def row23_late_start(t):
 
 
 def loaded_start(t, ticks):
-    """The left wheel restarts with 100 N on its shaft, and learns a wrong offset. Net force, or None."""
+    """The left wheel restarts with 100 N on its shaft, and measures a wrong offset. Net force, or None."""
     rig, client = t.running()
     ready = rig.wait_status(client, lambda s: s["left"]["offset_provenance"] == "wheel", 6)
     t.check(ready and abs(ready["left"]["force_net_mN"]) < 3000, "a good offset at first")
@@ -226,14 +226,14 @@ def loaded_start(t, ticks):
     return force
 
 
-@scenario("a wheel restarts under load, seen by its odometry: its new offset is not taken", 9)
+@scenario("a wheel restarts under load, seen by its odometry: its new offset is not used", 9)
 def row23_loaded_start(t):
     force = loaded_start(t, 1000)
     t.check(force["offset_window"] in ("loaded", "noisy", "drift"), f"the window is contaminated: {force['offset_window']}")
-    t.check(force["offset_provenance"] != "wheel", f"the wheel's new offset is not taken: {force['offset_provenance']}")
+    t.check(force["offset_provenance"] != "wheel", f"the wheel's new offset is not used: {force['offset_provenance']}")
 
 
-@scenario("a wheel restarts under load in a blink that nothing shows: its new offset contradicts, no value", 9)
+@scenario("a wheel restarts under load too fast to be detected: its new offset contradicts, no value", 9)
 def row23_loaded_start_unseen(t):
     force = loaded_start(t, 0)
     t.check(force["force_validity"] != "valid", f"flagged: {force['force_validity']}, net {force['force_net_mN']} mN")
