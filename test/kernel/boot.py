@@ -13,11 +13,11 @@ from harness import die_with_parent
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 VIRTUAL_NICE = 5
-MEMORY_ELSEWHERE = ("TMPDIR", "TMP", "TEMP")  # Folders in which the kernel would place its memory, perhaps on a disk; without them it is in /dev/shm.
+MEMORY_ELSEWHERE = ("TMPDIR", "TMP", "TEMP")  # Folders for the memory of the kernel, possibly on a disk; without these variables it is in /dev/shm.
 
 
 def find_kernel(install=True):
-    """Path of the kernel, built first if it is not there yet. Raises RuntimeError with what is missing."""
+    """Path of the kernel, which is built first if it does not exist. Raises RuntimeError with the reason if that fails."""
     command = [os.path.join(HERE, "build_kernel")]
     known = subprocess.run([*command, "--print"], stdout=subprocess.PIPE, text=True, check=False)
     if known.returncode == 0:
@@ -33,9 +33,9 @@ def find_kernel(install=True):
 
 
 class Boot:
-    """One boot that works off one plan.
+    """One boot that executes one plan.
 
-    It runs on `processors`. The plan (see guest.py) and what comes of it lie in `folder`: NAME.json, NAME.results (one JSON object per line, as
+    It runs on `processors`. The plan (see guest.py) and its results are in `folder`: NAME.json, NAME.results (one JSON object per line, as
     the tests end), NAME.out (what the guest printed), NAME.console (what the kernel printed), NAME.status.
     """
 
@@ -47,7 +47,7 @@ class Boot:
         open(self.path("results"), "w", encoding="utf-8").close()
         self.began = time.monotonic()
         with open(self.path("console"), "wb") as console:
-            # A session of its own: the kernel is a tree of processes, all of which must go with it.
+            # In its own session: the kernel is a tree of processes, and all of them must end with it.
             self.child = subprocess.Popen(
                 self.command(kernel),
                 stdin=subprocess.DEVNULL,
@@ -66,9 +66,9 @@ class Boot:
         os.sched_setaffinity(0, self.processors)
         if self.plan["virtual"]:
             os.nice(VIRTUAL_NICE)
-        if self.plan["virtual"] or self.plan["group"] == "starved":  # With a real-time priority it would use up its share and be stopped.
+        if self.plan["virtual"] or self.plan["group"] == "starved":  # With a real-time priority it would use up its share of the processor and be stopped.
             return
-        with contextlib.suppress(PermissionError):  # then the witness decides what can be judged
+        with contextlib.suppress(PermissionError):  # then the witness's file shows what can be judged
             os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(1))
 
     def command(self, kernel):
@@ -93,7 +93,7 @@ class Boot:
             return ""
 
     def results(self):
-        """Results that came since the last call."""
+        """Results since the last call."""
         with open(self.path("results"), encoding="utf-8") as file:
             file.seek(self.read_bytes)
             lines = file.read()
@@ -102,7 +102,7 @@ class Boot:
         return [json.loads(line) for line in whole.splitlines()]
 
     def running(self):
-        """Without reaping it: `end` wants to know what it cost."""
+        """Without reaping it: `end` reads its processor time."""
         return os.waitid(os.P_PID, self.child.pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is None
 
     def seconds(self):
@@ -113,7 +113,7 @@ class Boot:
         try:
             with open(self.path("stall"), encoding="ascii") as file:
                 seconds = float(file.read())
-        except (FileNotFoundError, ValueError):  # none, or not written yet
+        except (FileNotFoundError, ValueError):  # no request, or not written yet
             return
         os.kill(self.child.pid, signal.SIGSTOP)
         time.sleep(seconds)
@@ -133,9 +133,9 @@ class Boot:
         self.cpu_s = usage.ru_utime + usage.ru_stime
 
     def complaint(self):
-        """Why it ended before its plan did."""
+        """Why it ended before the end of its plan."""
         console = [line for line in self.text("console").splitlines() if line.strip()]
-        return "\n".join(["the guest's last words:", self.text("out", 1500), "the console's:", *console[-12:]])
+        return "\n".join(["the guest's last output:", self.text("out", 1500), "the console's:", *console[-12:]])
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Boots the groups of tests, two at a time, and reports the result of each test.
 
-Virtual time does not care how busy the machine is, real time does: while something runs in real time it has a processor to itself.
+Virtual time does not depend on the load of the machine. A group in real time has a processor of its own.
 """
 
 import argparse
@@ -50,7 +50,7 @@ class Campaign:
             signal.signal(number, self.interrupt)
 
     def plan(self, group):
-        """Which tests of the group are wanted; None if none is."""
+        """The tests of the group that are selected; None if there is none."""
         options = self.options
         names = [
             entry.name
@@ -74,7 +74,7 @@ class Campaign:
         }
 
     def boot(self, group):
-        """Works off one group. A boot that hangs or dies fails the tests that it did not get to."""
+        """Runs one group. If a boot hangs or ends early, the tests that it did not reach fail."""
         plan = self.plan(group)
         if plan is None or self.interrupted:
             return
@@ -113,7 +113,7 @@ class Campaign:
             self.add(group, {"name": name, "verdict": "failed", "failures": [[text, "rule", 0]]})
 
     def take_processor(self, group):
-        """The one with the fewest kernels. One, because a kernel that wanders between two takes half as long again."""
+        """The processor with the fewest kernels. A kernel stays on one, because it needs half as long again if it changes between two."""
         with self.lock:
             wanted = set(self.processors) - self.reserved if group.virtual else self.reserved or set(self.processors)
             processor = min(wanted, key=lambda number: (self.used[number], number))
@@ -121,7 +121,7 @@ class Campaign:
             return processor
 
     def real_time(self):
-        """All of it, one group at a time: they must not slow each other."""
+        """Runs all groups, one at a time, so that none slows another one."""
         for group in GROUPS:
             if not group.virtual:
                 self.boot(group)
@@ -141,13 +141,13 @@ class Campaign:
                 done.result()
 
     def why_skipped(self, group, plan):
-        """What is missing for a group that wants another build; else that build is in the plan, and the answer None."""
+        """The missing part for a group that needs another build. If nothing is missing, adds that build to the plan and returns None."""
         if group.distribution:
             return why_not_emulated(group.distribution)
         if group.gpiod == 0:
             return None
         if gpiod2.generation(plan["build"]) == group.gpiod:
-            return f"this system has libgpiod {group.gpiod} only, and that was tested"
+            return f"this system has only libgpiod {group.gpiod}, which other groups test"
         try:
             plan["build"] = gpiod2.find_build(plan["build"], not self.options.no_install)
         except RuntimeError as error:
@@ -176,7 +176,7 @@ class Campaign:
             self.tell_log(path)
 
     def tell_log(self, path):
-        """The end of a log of a failed test; of a bus log only what the gateway sent last."""
+        """The end of a log of a failed test; of a bus log only the last frames that the gateway sent."""
         with open(path, encoding="utf-8", errors="replace") as file:
             lines = file.read().splitlines()
         if path.endswith(".bus.log"):
@@ -189,7 +189,7 @@ class Campaign:
         return sum(result["verdict"] == verdict for result in self.results)
 
     def interrupt(self, *_):
-        """Ends every kernel; the threads that wait for them see it."""
+        """Ends every kernel. The threads that wait for them continue."""
         self.interrupted = True
         for boot in self.boots:
             boot.kill()
@@ -208,12 +208,12 @@ def parse(arguments):
     root = os.path.dirname(os.path.dirname(HERE))
     parser.add_argument("--build", default=os.path.join(root, "build", "default"), metavar="DIR", help="build directory")
     parser.add_argument("--only", action="append", metavar="NAME", help="only tests whose name contains this")
-    parser.add_argument("--real-time", action="store_true", help="only what runs in real time")
+    parser.add_argument("--real-time", action="store_true", help="only the groups in real time")
     parser.add_argument("--native", action="store_true", help="use this machine's own vcan and gpio-sim, in real time")
     parser.add_argument("--full", action="store_true", help=f"1000 presses, a soak of {HOURS_FULL} virtual hours")
     parser.add_argument("--repeat", type=int, default=1, metavar="N", help="N campaigns in a row, each with the next seed")
     parser.add_argument("--seed", type=int, default=1, metavar="N", help="of random faults (default: 1)")
-    soak = f"of the soak; 0: none (default: {HOURS}, with --full {HOURS_FULL}); a short one says what it cannot judge"
+    soak = f"of the soak; 0: none (default: {HOURS}, with --full {HOURS_FULL}); a short one prints what it cannot judge"
     parser.add_argument("--hours", type=float, metavar="H", help=soak)
     parser.add_argument("--jobs", type=int, default=2, metavar="N", help="kernels at a time (default: 2)")
     parser.add_argument("--log-lines", type=int, default=LOG_LINES, metavar="N", help="of each log of a failed test")
@@ -225,9 +225,9 @@ def parse(arguments):
     if options.hours is None:
         options.hours = HOURS_FULL if options.full else HOURS
     if min(options.repeat, options.jobs) < 1 or options.hours < 0:
-        parser.error("--repeat and --jobs want something above 0, --hours nothing below")
+        parser.error("--repeat and --jobs must be above 0, --hours must not be below 0")
     if options.native and options.report:
-        parser.error("--report describes the kernel that is built here, not this machine's own: leave out --native")
+        parser.error("--report describes the kernel of build_kernel, not the machine's own: leave out --native")
     return options
 
 
@@ -291,6 +291,6 @@ def main(arguments):
     results = [result for outcome in outcomes for result in outcome.results]
     inconclusive = [f"{result['group']}/{result['name']}" for result in results if result.get("inconclusive")]
     if len(outcomes) < options.repeat:
-        print(f"interrupted: {len(outcomes)} of {options.repeat} campaigns came to their end, and only those are counted")
+        print(f"interrupted: {len(outcomes)} of {options.repeat} campaigns were completed; only these are counted")
     code = summary(*totals, inconclusive, real_time=sum(result["group"] in repeated.REAL_TIME for result in results))
     return INTERRUPTED if len(outcomes) < options.repeat else code

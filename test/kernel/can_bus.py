@@ -27,16 +27,16 @@ def open_raw(interface, *ids):
 
 
 class CanBus(Bus):
-    """Records with the kernel's stamps, which are of the wall clock: who steps that calls `before_step` first.
+    """Records with the kernel's time stamps, which use the wall clock: a test that steps this clock calls `before_step` first.
 
-    Frames are fetched only now and then, or when somebody asks for `frames`: to wake up for each of them would cost more than
-    gateway and wheels together. `exact`: virtual time, in which the two clocks never drift apart.
+    Frames are fetched at intervals, or when a test reads `frames`: to wake up for each of them would cost more than
+    gateway and wheels together. `exact`: virtual time, in which the two clocks do not drift.
     """
 
     carries_fd = True
 
     def __init__(self, interface, frames=None, exact=False, ids=()):
-        # The local bus's recorder is not asked to connect: everything that differs is here.
+        # The constructor of the local bus's recorder is not called, because it connects to that bus.
         self.interface, self.exact = interface, exact
         self.socket = open_raw(interface, *ids)
         self.socket.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_RECV_OWN_MSGS, 1)
@@ -63,14 +63,14 @@ class CanBus(Bus):
         return self.recorded_errors
 
     def before_step(self):
-        """The wall clock will be stepped: what came until now has the old time. Afterwards `after_step`."""
+        """Call it before the wall clock is stepped: frames received until now have the old time. Afterwards call `after_step`."""
         self._drain()
 
     def after_step(self):
         self.ahead_ns = realtime_ahead_ns()
 
     def _take(self):
-        """One frame; False if there is none, or the interface went down, or it is gone."""
+        """Reads one frame; False if there is none, or the interface is down or removed."""
         try:
             data, ancillary, message_flags, _ = self.socket.recvmsg(FRAME.size, 64, socket.MSG_DONTWAIT)
         except OSError:
@@ -86,7 +86,7 @@ class CanBus(Bus):
         if not self.closed:
             with self.lock:
                 while self._take() or self._take():
-                    pass  # twice: one error, that the interface went down, may stand before frames
+                    pass  # Twice, because one error, that the interface went down, may precede the frames.
 
     def _fetch(self):
         number = 0
@@ -97,7 +97,7 @@ class CanBus(Bus):
             self._drain()
 
     def send_fd(self, can_id, data):
-        """A CAN FD frame, from a socket that may."""
+        """A CAN FD frame, from a socket that permits them."""
         with socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW) as sock:
             sock.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FD_FRAMES, 1)
             sock.bind((self.interface,))

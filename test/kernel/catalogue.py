@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The list of tests on a real kernel: what each is, on which rig it runs, and in which boot."""
+"""The list of tests on a real kernel: title, rig and boots of each."""
 
 from typing import NamedTuple
 from collections.abc import Callable
@@ -12,8 +12,8 @@ ENTRIES = {}
 class Entry(NamedTuple):
     """`groups`: the boots that run it. `row` is the row of the fault catalogue, 0 for the rig's own tests.
 
-    In virtual time telemetry comes `pace` times slower than documented: each frame costs such a kernel half a millisecond, and a
-    gateway that is rarely woken by frames has the harder task. In real time it comes as documented.
+    In virtual time the interval of telemetry is `pace` times the documented one: each frame costs such a kernel half a millisecond, and a
+    gateway that frames wake rarely has the harder task. In real time the interval is the documented one.
     """
 
     name: str

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
 """The distribution's own kernel in an emulated machine with two CAN controllers on one bus: SJA1000 (Kvaser PCI cards), or CTU CAN FD.
 
-Nobody here configured that kernel, and its driver is one that boards have: bit timing over netlink, IFF_ECHO, restart-ms. Its clock
-counts instructions (2 ns each) and jumps while nobody works, so that no load on this machine makes it late. Neither bus errors nor the
+That kernel has the distribution's configuration, and a driver that real boards use: bit timing over netlink, IFF_ECHO, restart-ms. Its clock
+counts instructions (2 ns each) and jumps while the machine is idle, so that no load on this machine makes it late. Neither bus errors nor the
 duration of a frame are modelled, and Debian 12's kernel has no gpio-sim: the e-stop's button is the local one.
 
-Also for another architecture: then everything in that machine is Debian's for it, and the programs are those of the packages that
+Also for another architecture: then all files in that machine are Debian's for it, and the programs are those of the packages that
 test/cross/run has built.
 """
 
@@ -24,8 +24,8 @@ ROOT = os.path.dirname(os.path.dirname(HERE))
 
 
 class Machine(NamedTuple):
-    """One that is emulated. `cards`: two controllers on the bus `bus`. `parts`: packages of its architecture that it is made of; without, of
-    this machine's own files. `built`: a driver that the distribution leaves out, by its folder in the kernel's source, and how it is asked for."""
+    """An emulated machine. `cards`: two controllers on the bus `bus`. `parts`: the packages of its architecture with its files; default:
+    this machine's own files. `built`: a driver that the distribution leaves out: its folder in the kernel's source, and its build options."""
 
     architecture: str  # as Debian calls it
     emulator: tuple
@@ -63,14 +63,14 @@ MACHINES = {
 }
 HERE_IS = {"x86_64": "amd64"}  # os.uname() and Debian
 CONTROLLERS = ("can0", "can1")
-# In the order in which they are loaded; what a kernel has built in is no file, and nothing is missing then.
+# In the order in which they are loaded. A module that is built into the kernel has no file, and is not missing.
 MODULES = "virtio_ring virtio virtio_pci_legacy_dev virtio_pci_modern_dev virtio_pci netfs fscache 9pnet 9pnet_virtio 9p can-dev can can-raw sja1000 kvaser_pci ctucanfd ctucanfd_pci"
 TOOLS = ("bash", "busybox", "cat", "ip", "ln", "mkdir", "mount", "mountpoint", "sh", "sleep", "sync", "tc")
 PACKAGES = {"cpio": "cpio", "busybox": "busybox-static", "ip": "iproute2", "apt-get": "apt", "dpkg-deb": "dpkg"}
 PATH = "/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin"
 OWN = ("app/gateway/iwheel-gateway", "app/sim/iwheel-sim", "app/ctl/iwheelctl", "test/kernel/iwheel-sleeper")
 SETTINGS = ("/etc/passwd", "/etc/group", "/etc/nsswitch.conf", "/etc/ld.so.cache")
-# Parts of Python's own library that no test needs, with most of its bytes.
+# The largest parts of Python's standard library, which no test needs.
 NOT_NEEDED = ("test", "tests", "idlelib", "lib2to3", "ensurepip", "dist-packages", "site-packages", "tkinter", "turtledemo", "pydoc_data")
 FIRST = """#!/bin/bash
 cd /modules || exit 1
@@ -86,7 +86,7 @@ def cache():
 
 
 def output(*command, **options):
-    """What it says. Raises RuntimeError with the end of that if it fails."""
+    """Returns the output of the command. Raises RuntimeError with its end if the command fails."""
     done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False, **options)
     if done.returncode != 0:
         raise RuntimeError(f"{' '.join(command)}: {done.stdout.strip()[-300:]}")
@@ -94,7 +94,7 @@ def output(*command, **options):
 
 
 def here():
-    """Debian's name of this machine's architecture. RuntimeError if nothing is made for it."""
+    """Debian's name of this machine's architecture. RuntimeError if these tests do not support it."""
     machine = os.uname().machine
     if machine not in HERE_IS:
         raise RuntimeError(f"made for {', '.join(HERE_IS)}, and this machine is {machine}")
@@ -102,7 +102,7 @@ def here():
 
 
 def package_name():
-    """The kernel's package that this distribution installs today."""
+    """The package of the kernel that this distribution installs now."""
     found = re.search(r"Depends: (linux-image-[0-9]\S+)", output("apt-cache", "depends", f"linux-image-{here()}"))
     if not found:
         raise RuntimeError(f"this distribution has no package linux-image-{here()}")
@@ -116,7 +116,7 @@ def need(**packages):
 
 
 def find_kernel(name):
-    """A folder with `vmlinuz` and the modules that are needed, fetched once for each version; of another architecture, also `root`. RuntimeError: why there is none."""
+    """A folder with `vmlinuz` and the modules that are needed, fetched once for each version; of another architecture, also `root`. RuntimeError: the reason why there is none."""
     machine = MACHINES[name]
     need(**PACKAGES, **{machine.emulator[0]: machine.package})
     if machine.architecture != here():
@@ -136,7 +136,7 @@ def find_kernel(name):
 
 
 def find_foreign(machine):
-    """The same of another architecture, with all that such a machine has."""
+    """The same for another architecture, with all files of such a machine."""
     folder = os.path.join(cache(), f"distribution-{machine.architecture}")
     root = os.path.join(folder, "root")
     fresh = not os.path.exists(os.path.join(root, "wanted"))
@@ -147,7 +147,7 @@ def find_foreign(machine):
 
 
 def packages_of(architecture):
-    """The packages of this project for that architecture. RuntimeError: where they come from."""
+    """The packages of this project for that architecture. RuntimeError: the command that builds them."""
     folder = os.path.join(ROOT, "build", "cross", architecture)
     names = [
         name
@@ -174,7 +174,7 @@ def why_not_emulated(name):
 
 
 def download(packages, work):
-    """Without installing them; returns where they lie."""
+    """Unpacks them without installing; returns their folder."""
     output("apt-get", "-q", "-o", "APT::Sandbox::User=root", "download", *packages, cwd=work)
     return [os.path.join(work, name) for name in sorted(os.listdir(work)) if name.endswith(".deb")]
 
@@ -196,7 +196,7 @@ def build_modules(image, version, built, work):
         output("dpkg-deb", "-x", archive, folder)
     output("tar", "-xJf", os.path.join(folder, "usr", "src", f"{source}.tar.xz"), f"{source}/{built[0]}", cwd=folder)
     tree = os.path.join(folder, "usr", "src", headers[0])
-    with open(os.path.join(tree, "Makefile"), "r+", encoding="ascii") as makefile:  # It names where its package is installed.
+    with open(os.path.join(tree, "Makefile"), "r+", encoding="ascii") as makefile:  # It contains the path at which its package is installed.
         text = makefile.read().replace("/usr/src", os.path.join(folder, "usr", "src"))
         makefile.seek(0)
         makefile.write(text)
@@ -227,7 +227,7 @@ class Image:
         self.files = set()
 
     def add(self, path):
-        """With the folders above it, and what it links to."""
+        """Copies it with the folders above it, and the target of a link."""
         path = os.path.join(os.path.realpath(os.path.dirname(path)), os.path.basename(path))
         while path != "/" and path not in self.files:
             self.files.add(path)
@@ -236,7 +236,7 @@ class Image:
             path = os.path.dirname(path)
 
     def add_program(self, path):
-        """With the libraries it is linked with."""
+        """Copies it with the libraries that it is linked with."""
         self.add(path)
         self.add(os.path.realpath(path))
         for library in re.findall(
@@ -276,7 +276,7 @@ def own_files(build):
 
 
 def all_files(root, leave_out=()):
-    """Whatever is below that folder."""
+    """Copies everything below that folder."""
     image = Image()
     for folder, folders, files in os.walk(root):
         folders[:] = [name for name in folders if name not in leave_out]
@@ -288,7 +288,7 @@ def write_foreign(file, machine, kernel, work):
     """Debian's files of that architecture, and over them the programs of this project's packages, at their places under /usr."""
     root = os.path.join(kernel, "root")
     all_files(root, (*NOT_NEEDED, "boot", "modules", "doc", "man", "locale", "include", "shlibs.local")).write(file, root)
-    with tempfile.TemporaryDirectory() as unpacked:  # Their /lib is a folder, the system's a link.
+    with tempfile.TemporaryDirectory() as unpacked:  # Their /lib is a folder, that of the system is a link.
         for package in packages_of(machine.architecture):
             output("dpkg-deb", "-x", package, unpacked)
         shutil.copytree(os.path.join(unpacked, "usr", "bin"), os.path.join(work, "usr", "bin"))
@@ -298,7 +298,7 @@ def write_foreign(file, machine, kernel, work):
 
 
 def write_image(path, machine, build, kernel, results):
-    """The image for tests of that build, whose results go to that folder of this machine's."""
+    """The image for tests of that build; the results are written to that folder of this machine."""
     tests = Image()
     for folder in ("test/support", "test/system", "test/kernel", "share"):
         tests.add_tree(os.path.join(ROOT, folder), ("__pycache__",))
@@ -319,7 +319,7 @@ def write_image(path, machine, build, kernel, results):
 
 
 class EmulatedBoot(Boot):
-    """One boot of that machine; the same plan, the same results."""
+    """One boot of that machine, with the same plan and results as Boot."""
 
     def __init__(self, machine, folder, name, plan, processors):
         self.machine, self.distribution = MACHINES[machine], find_kernel(machine)

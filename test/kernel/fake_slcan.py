@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A CAN adapter that speaks slcan, on a pseudo terminal: to the kernel a real `can` device with states and faults.
+"""A CAN adapter with the protocol slcan, on a pseudo terminal: for the kernel a real `can` device with states and faults.
 
     gateway -- canN (slcan) -- pty -- this thread -- the simulator's bus (unix:PATH)
 
@@ -34,7 +34,7 @@ def to_line(can_id, length, data):
 
 
 def from_line(line):
-    """What the kernel wrote, as (id, length, data); None if it is no frame."""
+    """The frame that the kernel wrote, as (id, length, data); None if it is no frame."""
     if line[:1] not in b"tTrR" or not line:
         return None
     extended = line[:1] in b"TR"
@@ -79,7 +79,7 @@ class FakeSlcan(threading.Thread):
         up(self.interface)
 
     def unplug(self):
-        """The cable is pulled: the terminal hangs up and the interface goes with it."""
+        """The cable is unplugged: the terminal hangs up, and the kernel removes the interface."""
         with self.lock:
             os.close(self.master)
             os.close(self.slave)
@@ -119,7 +119,7 @@ class FakeSlcan(threading.Thread):
     def write(self, line):
         with self.lock:
             if self.master is not None:
-                with contextlib.suppress(BlockingIOError):  # the kernel does not read: a real adapter loses it too
+                with contextlib.suppress(BlockingIOError):  # the kernel does not read: a real adapter loses the frame too
                     os.write(self.master, line)
 
     def _wake(self):
@@ -142,7 +142,7 @@ class FakeSlcan(threading.Thread):
                     self._from_kernel()
 
     def _from_kernel(self):
-        with contextlib.suppress(OSError):  # nobody has the other end open
+        with contextlib.suppress(OSError):  # no process has the other end open
             self.pending += os.read(self.master, READ_BYTES)
 
     def _take_lines(self):
@@ -174,7 +174,7 @@ class FakeSlcan(threading.Thread):
             self.hub.connect(self.hub_path)
 
     def _close_channel(self):
-        """The controller is reset: what it had not sent is gone."""
+        """The controller is reset: frames that it has not sent are lost."""
         self.open = False
         self.waiting = 0
         if self.hub:

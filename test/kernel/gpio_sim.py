@@ -14,7 +14,7 @@ EVENT = struct.Struct("=QI36x")  # struct gpio_v2_line_event
 
 
 def write(path, text):
-    """By three system calls and no more: a press is timed."""
+    """With only three system calls, because presses are timed."""
     file = os.open(path, os.O_WRONLY | os.O_CLOEXEC)
     try:
         os.write(file, text.encode())
@@ -28,7 +28,7 @@ def read(path):
 
 
 class GpioChip:
-    """The line `name` at OFFSET, `second` at SECOND, one without a name at WITNESS. `pull` is what contact and resistor do to a line."""
+    """The line `name` at OFFSET, `second` at SECOND, one without a name at WITNESS. `pull` is the effect of contact and resistor on a line."""
 
     OFFSET, SECOND, WITNESS, LINES = 4, 5, 3, 8
 

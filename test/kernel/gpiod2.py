@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The gateway built with libgpiod 2, where the system has libgpiod 1: both generations must read the same line alike."""
+"""The gateway built with libgpiod 2, where the system has libgpiod 1: the gateway must read the same line in the same way with both versions."""
 
 import os
 import re
@@ -10,7 +10,7 @@ ROOT = os.path.dirname(os.path.dirname(HERE))
 
 
 def generation(build):
-    """Of the libgpiod that a build directory was configured with; None if it has none."""
+    """The major version of libgpiod in the configuration of a build directory; None if it has none."""
     try:
         with open(os.path.join(build, "CMakeCache.txt"), encoding="utf-8") as file:
             found = re.search(r"^LIBGPIOD_VERSION:INTERNAL=(\d+)", file.read(), re.MULTILINE)
@@ -20,7 +20,7 @@ def generation(build):
 
 
 def last_line(command, **variables):
-    """Runs it; its last line of output. Raises RuntimeError with what it said if it fails."""
+    """Runs it; returns the last line of its output. Raises RuntimeError with that line if it fails."""
     done = subprocess.run(command, cwd=ROOT, env={**os.environ, **variables}, text=True, check=False, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
     lines = done.stdout.strip().splitlines() or [""]
     if done.returncode != 0:

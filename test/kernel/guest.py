@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Inside the kernel: works off one plan, test by test.
+"""Inside the kernel: executes one plan, test by test.
 
 Usage: guest.py PLAN.json
 The plan: {"build": DIR, "tests": [NAME...], "virtual": BOOL, "full": BOOL, "results": FILE, "seed": N}. One JSON object per test

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Inside the kernel: runs one test in a process of its own, and decides whether a failure is to be blamed on a late machine."""
+"""Inside the kernel: runs one test in a process of its own, and decides whether a late machine caused its failure."""
 
 import contextlib
 import json
@@ -33,7 +33,7 @@ def run_one(entry, plan):
     try:
         entry.function(test)
     except Skip as reason:
-        skip = str(reason) if not test.failures else None  # what was found already is judged
+        skip = str(reason) if not test.failures else None  # the findings so far are judged
     except Exception as error:  # noqa: BLE001
         where = [f"{os.path.basename(s.filename)}:{s.lineno}" for s in traceback.extract_tb(error.__traceback__)][-4:]
         output = "".join(rig.gateway.text()[-600:] for rig in test.rigs if rig.gateway)
@@ -78,7 +78,7 @@ def died(text):
 
 
 def hasten_received_frames():
-    """Under load Linux leaves received frames, echoes too, to a thread of no priority: services would receive nothing for some ticks while tests compute."""
+    """Under load, Linux processes received frames and echoes in a thread without priority: services would receive nothing for some ticks while tests compute."""
     for pid in filter(str.isdigit, os.listdir("/proc")):
         try:
             with open(f"/proc/{pid}/comm", encoding="ascii", errors="replace") as file:
@@ -98,7 +98,7 @@ class GuestRun(Session):
     """The runner of the scenarios, with forked workers; in virtual time no machine is late, so every verdict is conclusive.
 
     In real time a witness runs in parallel, with the gateway's priority. Setting up a test always delays it a little (a fork is slow in
-    such a kernel), so what counts is a delay that is long enough, and near enough, to have caused what is wrong.
+    such a kernel), so what counts is a delay that is long enough, and near enough, to have caused the failure.
     """
 
     def __init__(self, plan):
@@ -110,7 +110,7 @@ class GuestRun(Session):
     def watch(self):
         """In real time: from now on the witness runs in parallel, until `close`."""
         sys.setswitchinterval(SWITCH_S)
-        if not self.plan["native"]:  # a machine's own kernel is left as it is
+        if not self.plan["native"]:  # a machine's own kernel is not changed
             hasten_received_frames()
         self.folder = tempfile.mkdtemp(prefix="iwheel-witness-")  # not next to the results: the host's files are slow
         file = os.path.join(self.folder, "late")
@@ -129,7 +129,7 @@ class GuestRun(Session):
         return kernel_rig.late_wakings(begin_us, end_us, kernel_rig.STALL_US)
 
     def explained(self, attempt, failure):
-        if failure.text.startswith("pair_spread"):  # the strictest of all, and over in a moment
+        if failure.text.startswith("pair_spread"):  # the strictest limit of all, and the test is short
             around = failure.at_us - kernel_rig.TICK_US, failure.at_us + kernel_rig.TICK_US
             return explains(failure, kernel_rig.late_wakings(*around, kernel_rig.PRESS_LATE_US))
         if failure.text.startswith("no_silence"):  # the end of a hold depends on all frames received before
@@ -169,7 +169,7 @@ class GuestRun(Session):
 
 
 def read_all(descriptor, seconds):
-    """What comes until the end of the pipe; None if that takes longer."""
+    """Reads until the end of the pipe; None if that takes longer."""
     text, deadline = b"", time.monotonic() + seconds
     with os.fdopen(descriptor, "rb", buffering=0) as pipe:
         while True:

@@ -20,19 +20,19 @@ NUMBERS = itertools.count()
 EDGE_S = 1.0
 MARKERS = "/run/iwheel"
 TICK_US = 10_000
-BEFORE_TICK_US, BEFORE_TICK_REAL_US, SPIN_US = 200, 700, 3_000  # in real time it takes a while to move two lines
-RAW_ESTOP_US = 1_000_000  # the judge's own limit; what counts is the time from the edge
+BEFORE_TICK_US, BEFORE_TICK_REAL_US, SPIN_US = 200, 700, 3_000  # in real time, moving two lines needs some time
+RAW_ESTOP_US = 1_000_000  # the judge's own limit; the limit from the edge is tested separately
 ESTOP_US = 5_000  # invariant 2, 99th percentile
-MOVE_US = 2_000  # if moving the contact took longer, nobody knows when the level changed
+MOVE_US = 2_000  # if moving the contact took longer, the time of the change of level is unknown
 LEVEL_US = TICK_US + ESTOP_US  # from the level: the simulated line reports its edge a tick later at the latest
 CLOCK = {"virtual": False}  # set once, by guest.py, before the first scenario
 WITNESS = {"file": None}  # set by guest.py in real time: what iwheel-sleeper writes
-PRESS_LATE_US = 3_000  # a press is timed against 5 ms; a machine later than this could be to blame
+PRESS_LATE_US = 3_000  # a press must stop within 5 ms; a machine that is later than this could be the cause of a failure
 STALL_US = 10_000  # what the judge allows between the gateway's clock and the bus
 
 
 def late_wakings(from_us, to_us, more_than_us):
-    """When the witness woke up that late meanwhile, and how late. In virtual time there is none, and nothing is late."""
+    """When the witness woke up that late in this time, and how late. In virtual time there is no witness, and nothing is late."""
     return read_stalls(WITNESS["file"], from_us, to_us, more_than_us) if WITNESS["file"] else []
 
 
@@ -52,12 +52,12 @@ class GpioButton:
     """The e-stop contact on a simulated line. Mixed into a rig; `active` is the level of a pressed button.
 
     The simulated chip changes the level immediately but delivers edges at the kernel's next timer tick, up to 10 ms later. So the
-    contact is moved right before a tick, and a second line, the witness, is pulled in the same instant: the kernel's stamp of
-    its edge is when the edge happened. `presses` lists all of them.
+    contact is moved right before a tick, and a second line, the witness, is pulled in the same instant: the kernel's time stamp of
+    its edge is the time of the edge. `presses` lists all presses.
     """
 
     two_contacts = False
-    active = "low"  # with "high" the bias that the gateway asks for outweighs the contact to ground: see HighVcanRig
+    active = "low"  # with "high" the bias that the gateway requests is stronger than the contact to ground: see HighVcanRig
 
     def make_button(self):
         self.line = f"ESTOP{next(NUMBERS)}"
@@ -83,7 +83,7 @@ class GpioButton:
         return edge[0]
 
     def _contact(self, pressed):
-        """Moves it and before it the witness. Returns when the level began to change and when that was done."""
+        """Moves the witness, then the contact. Returns the times when the level began to change and when this was done."""
         self.chip.pull(pressed, self.chip.WITNESS)
         level_us = now_us()
         self.chip.pull(pressed == (self.active == "high"))
@@ -100,13 +100,13 @@ class GpioButton:
         return self._contact(True)
 
     def _pressed(self, moved):
-        """Waits for the edge and writes both into the timeline: from the level on a stop has its reason."""
+        """Waits for the edge and writes both into the timeline: after the change of level the gateway may stop."""
         level_us, done_us = moved
         edge = self.witness.next(EDGE_S)
         if edge is None:
             raise RuntimeError("the simulated GPIO chip delivered no edge")
-        self.tick_us = edge[0]  # in real time ticks wander
-        edge_us = max(edge[0], done_us)  # a slow machine may stand still between the two lines
+        self.tick_us = edge[0]  # in real time the ticks are not exact
+        edge_us = max(edge[0], done_us)  # the machine may stall between the two lines
         self.presses.append(Press(level_us, done_us, edge_us))
         self.timeline.append(Event(level_us, "cut", within_us=edge_us - level_us))
         self.timeline.append(Event(edge_us, "press", now_us()))
@@ -129,7 +129,7 @@ class GpioButton:
         return edge_us
 
     def lose_chip(self):
-        """The chip goes while it is held. A press, as far as the rules are concerned."""
+        """The chip is removed while its line is requested. For the rules this is a press."""
         self.witness.close()
         t_us = now_us()
         self.chip.vanish()
@@ -147,7 +147,7 @@ class GpioButton:
 
 
 def remove_marker(interface):
-    """What a gateway that was killed left for the next one on this interface: the next test's has another past."""
+    """Removes the marker that a killed gateway left for the next one on this interface, so that it does not affect the next test."""
     with contextlib.suppress(FileNotFoundError):
         os.unlink(f"{MARKERS}/{interface}.armed")
 
@@ -201,10 +201,10 @@ class TwoContactsRig(VcanRig):
 
 
 class HighVcanRig(VcanRig):
-    """The contact as it should be wired: normally closed to ground, so that pressed or a cut wire is high.
+    """The contact as it should be wired: normally closed to ground, so that a press or a cut wire is high.
 
-    gpio-sim knows one pull only: when the gateway asks for its pull-up, the line goes high although the contact is closed.
-    So the contact is closed again once the line is open, and the latch of that is reset.
+    gpio-sim models one pull only: when the gateway requests its pull-up, the line becomes high although the contact is closed.
+    So the contact is closed again after the gateway has opened the line, and the latch that this caused is reset.
     """
 
     active = "high"
@@ -238,7 +238,7 @@ class SlcanRig(GpioButton, Rig):
     def prepare(self):
         self.adapter = None
         self.make_button()
-        # It has no bit timing to show; the gateway must live with that.
+        # It reports no bit timing; the gateway must work without it.
 
     def __init__(self, *arguments, **options):
         super().__init__(*arguments, **options)
@@ -256,18 +256,18 @@ class SlcanRig(GpioButton, Rig):
 
 
 class KernelTest(Test):
-    """A test on a rig of that type; `measures` are figures for the table of the fault catalogue."""
+    """A test on a rig of that type. `measures` has figures for the table of the fault catalogue."""
 
     def __init__(self, build, rig_type):
         super().__init__(build)
         self.rig_type = rig_type
         self.measures = {}
         self.from_level = []  # (level changed at, microseconds to the zero pair) of presses in motion
-        self.met = 0  # how many those were, with those that could not be timed
-        self.late_machine = 0  # presses that count for nothing, because of it
+        self.met = 0  # the number of presses in motion, including those that could not be timed
+        self.late_machine = 0  # presses that do not count, because the machine was late
 
     def measure(self, name, value):
-        """Stores the worst value of that name, and shows it."""
+        """Stores the worst value of that name, and prints it."""
         self.measures[name] = max(value, self.measures.get(name, value))
 
     def judge(self, rig, moves=True, **options):
@@ -280,7 +280,7 @@ class KernelTest(Test):
         self.latencies[known:] = [pair for pair in pairs if not self.excused(*pair)]
         self.late_machine += len(pairs) - len(self.latencies[known:])
         if pairs:
-            self.figures.pop()  # the judge's own, of what was not excused yet
+            self.figures.pop()  # the judge's own findings that are not excused yet
         self.judge_estop("e-stop to zero", self.latencies[known:], ESTOP_US)
         known = len(self.from_level)
         self.take_levels(rig, judge)
@@ -289,7 +289,7 @@ class KernelTest(Test):
         return judge
 
     def judge_estop(self, name, pairs, limit_us):
-        """Of one kind of latency: a figure, and the limit of its 99th percentile."""
+        """For one kind of latency: a figure, and the limit of its 99th percentile."""
         values_ms = [latency_us / 1000 for _, latency_us in pairs]
         if values_ms:
             p50_ms, p99_ms = percentile(values_ms, 50), percentile(values_ms, 99)
@@ -298,14 +298,14 @@ class KernelTest(Test):
 
     @staticmethod
     def excused(since_us, latency_us, limit_us=ESTOP_US):
-        """Too late, and so was the machine, before the limit was over: what came later explains nothing.
+        """Too late, and the machine was late before the end of the limit: a later stall explains nothing.
 
-        A late machine makes no stop faster: one in time counts, whatever else ran.
+        A late machine makes no stop faster: a stop in time counts, whatever else ran.
         """
         return latency_us > limit_us and machine_late(since_us - TICK_US, since_us + limit_us, PRESS_LATE_US)
 
     def take_levels(self, rig, judge):
-        """Of each press in motion: when the level changed, and how long until both wheels had their zero."""
+        """For each press in motion: when the level changed, and the time until both wheels had their zero."""
         for press in rig.presses:
             zeros = [judge.next_zero_us(side, press.level_us) for side in (0, 1)]
             if None in zeros or not judge.moving_at(press.level_us):
@@ -317,7 +317,7 @@ class KernelTest(Test):
 
     @staticmethod
     def after_edge(rig, judge, edge_us, latency_us):
-        """A gateway that saw the level began with its zeros before the edge came: its pair is the first one after the level."""
+        """If the gateway read the level, its zeros began before the edge: its pair is the first one after the level."""
         for level_us in (press.level_us for press in rig.presses if press.edge_us == edge_us):
             zeros = [judge.next_zero_us(side, level_us) for side in (0, 1)]
             if None not in zeros and min(zeros) <= edge_us:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""The same tests on the machine's own kernel, where it has vcan and gpio-sim and lets us use them. In real time, all of them.
+"""The same tests on the machine's own kernel, if it has vcan and gpio-sim and permits their use. All of them run in real time.
 
-What it asks for, what it answers where something is missing, and how it starts the tests is tested (test_native.py), and some of the
-tests are run by it inside the kernel of the tests (kernel_scenarios/native_inside.py). Whether they pass on a kernel that is no process
-depends on that kernel; docs/developer/fault-catalogue.md says where they were run.
+test_native.py tests what it requires, its messages about missing parts, and how it starts the tests. Some of the
+tests run with it inside the kernel of the tests (kernel_scenarios/native_inside.py). Whether they pass on another kernel
+depends on that kernel; docs/developer/fault-catalogue.md shows where they were run.
 """
 
 import os
@@ -17,7 +17,7 @@ from harness import die_with_parent
 
 GPIO_SIM = "/sys/kernel/config/gpio-sim"
 PROGRAMS = {"unshare": "util-linux", "nsenter": "util-linux", "mount": "mount", "ip": "iproute2", "tc": "iproute2"}
-# A network of its own, /sys that shows it, and a place for the marks of armed gateways, away from those of real ones.
+# A network of its own, /sys for it, and a separate folder for the markers of armed gateways, so that those of real ones stay untouched.
 ALONE = ["unshare", "--net", "--mount", "sh", "-e", "-c"]
 SURROUNDINGS = """
 mount -t sysfs sysfs /sys
@@ -34,7 +34,7 @@ def why_not_alone():
     tried = subprocess.run([*ALONE, "true"], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
     if tried.returncode == 0:
         return None
-    # A chroot of a plain folder: mounts made in there would be made outside as well.
+    # In a chroot of a plain folder, mounts would appear outside of it too.
     fix = " (in a chroot: mount --bind its folder onto itself before you enter it)" if "propagation" in tried.stdout else ""
     return f"a private network and private mounts are not available here: {tried.stdout.strip()}{fix}"
 
@@ -60,7 +60,7 @@ def why_not_native():
 
 
 class NativeBoot(Boot):
-    """No boot at all: the guest's program in surroundings of its own on this kernel."""
+    """No boot: the guest's program with a private network and private mounts on this kernel."""
 
     def prepare(self):
         die_with_parent()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Network interfaces, queueing disciplines and capabilities, by the programs an administrator would use."""
+"""Network interfaces, queueing disciplines and capabilities, with the programs that an administrator uses."""
 
 import contextlib
 import ctypes
@@ -13,7 +13,7 @@ IFF_UP, IFF_ECHO = 1, 1 << 18
 
 
 def command(*words):
-    """Runs it; raises RuntimeError with what it said if it fails."""
+    """Runs it; raises RuntimeError with its output if it fails."""
     done = subprocess.run(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
     if done.returncode != 0:
         raise RuntimeError(f"{' '.join(words)}: {done.stdout.strip()}")
@@ -42,7 +42,7 @@ def exists(name):
 
 
 def fetch(name):
-    """Into this network: what belongs to a terminal appears in the first one, and --native has one of its own."""
+    """Moves the interface into this network: the interface of a terminal appears in the first network, and --native has one of its own."""
     if not exists(name):
         command("nsenter", "--net=/proc/1/ns/net", "ip", "link", "set", name, "netns", str(os.getpid()))
 
@@ -53,7 +53,7 @@ def flags(name):
 
 
 def discipline(name, *words):
-    """Replaces the root queueing discipline; without words puts the default back."""
+    """Replaces the root queueing discipline; without arguments, restores the default."""
     if words:
         command("tc", "qdisc", "replace", "dev", name, "root", *words)
     else:
@@ -61,7 +61,7 @@ def discipline(name, *words):
 
 
 def without_net_admin():
-    """For the child between fork and exec: root, but not allowed to touch interfaces."""
+    """For the child between fork and exec: root, but without the right to change interfaces."""
     if ctypes.CDLL(None, use_errno=True).prctl(PR_CAPBSET_DROP, CAP_NET_ADMIN, 0, 0, 0) != 0:
         raise OSError(ctypes.get_errno(), "cannot drop CAP_NET_ADMIN")
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Several campaigns in a row: what came of each, and what of all together, in words."""
+"""Several campaigns in a row: the result of each, and of all together, as text."""
 
 from typing import NamedTuple
 
@@ -56,7 +56,7 @@ def estop_words(outcomes):
 
 
 def summary(outcomes, wanted):
-    """At the end: how many were without a failure, and what was not as it should be, where."""
+    """At the end: the number of campaigns without a failure; the tests that failed or were skipped, and in which campaigns."""
     clean = sum(not outcome.names("failed") for outcome in outcomes)
     yield f"{len(outcomes)} of {wanted} campaigns in {minutes(sum(o.seconds for o in outcomes))}: {clean} without a failure, {len(outcomes) - clean} with one"
     ran = {f"{r['group']}/{r['name']}" for outcome in outcomes for r in outcome.results}

@@ -170,7 +170,7 @@ def figure_lines(results, title, names):
 
 
 def run_text(outcomes, options):
-    """What this run was, and what it was not: a longer one counts only where it was made."""
+    """Describes this run, and the parts that it did not have."""
     last = outcomes[-1]
     text = "{} tests passed, {} failed, {} were not judged.".format(*last.counts())
     text = f"One campaign with seed {last.seed}: {text}"
@@ -187,7 +187,7 @@ def run_text(outcomes, options):
 
 
 def row_text(outcomes):
-    """Of several campaigns in a row; the tables are of the last one, the e-stop's of all."""
+    """Describes several campaigns in a row. The tables are from the last one, the e-stop's table is from all."""
     if len(outcomes) == 1:
         return "Not run for this page: several campaigns in a row (`--repeat`).\n"
     lines = "".join(f"- {line}\n" for line in repeated.summary(outcomes, len(outcomes)))
@@ -195,7 +195,7 @@ def row_text(outcomes):
 
 
 def write(outcomes, options):
-    """Replaces the page: of the last campaign of a row, with the presses of all."""
+    """Replaces the page: results of the last campaign in a row, with the presses of all."""
     real_time = repeated.REAL_TIME
     results = outcomes[-1].results
     lines = [row_line(row, results, real_time) for row in ROWS]

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""The distribution's kernel: what is asked for, and what is answered where it cannot be had. Needs no emulator.
+"""The distribution's kernel: its requirements, and the messages if it is not available. Needs no emulator.
 
 Usage: test/kernel/test_distribution.py
 """
@@ -54,7 +54,7 @@ class Distribution(unittest.TestCase):
             self.assertIsNone(distribution.why_not_emulated("amd64"))
 
     def foreign(self, *packages):
-        """arm64 with its files already here and these packages of ours; why it cannot be emulated."""
+        """arm64 with its files present and these packages of this project; returns the reason why it cannot be emulated."""
         root = os.path.join(self.folder, "iwheel", "distribution-arm64", "root")
         ours = os.path.join(self.folder, "build", "cross", "arm64")
         for folder in (os.path.join(root, "boot"), ours):

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""--native: what it asks for, what it answers where that is missing, and how it starts the tests. Needs no kernel modules.
+"""--native: its requirements, its messages about missing parts, and how it starts the tests. Needs no kernel modules.
 
 Usage: test/kernel/test_native.py
 """
@@ -76,7 +76,7 @@ class Native(unittest.TestCase):
 
 
 class NativeBoot(unittest.TestCase):
-    """The real thing, without a test in its plan: it needs no module, only the right to a network of its own."""
+    """A real start without a test in its plan: it needs no module, only the right to have a network of its own."""
 
     def test_plan_without_tests_is_worked_off_and_ends(self):
         reason = native.why_not_alone() if os.geteuid() == 0 else "needs root"

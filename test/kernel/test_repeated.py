@@ -62,7 +62,7 @@ class Campaigns(unittest.TestCase):
         code, lines = self.run_main(["--repeat", "3"], [[result("row12_glitch")], None])
         self.assertEqual((campaign.INTERRUPTED, "1 passed, 0 failed, 0 skipped"), (code, lines[-1]))
         self.assertRegex(lines[1], "^1 of 3 campaigns")
-        self.assertIn("interrupted: 1 of 3 campaigns came to their end, and only those are counted", lines)
+        self.assertIn("interrupted: 1 of 3 campaigns were completed; only these are counted", lines)
 
 
 class Summary(unittest.TestCase):

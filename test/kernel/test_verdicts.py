@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""What a late machine excuses in real time, and what it does not, by a witness's file that is made up. Needs no kernel.
+"""What a late machine excuses in real time, and what it does not, tested with an invented file of a witness. Needs no kernel.
 
 Usage: test/kernel/test_verdicts.py
 """
@@ -49,7 +49,7 @@ class Witnessed(unittest.TestCase):
         self.addCleanup(kernel_rig.WITNESS.update, file=None)
 
     def late(self, at_us, by_us):
-        """The witness was woken at that time, so much too late."""
+        """The witness woke up at that time, this much too late."""
         self.file.write(f"{at_us} {by_us}\n")
         self.file.flush()
 
@@ -106,7 +106,7 @@ class Verdicts(Witnessed):
 
     def test_virtual_time_excuses_nothing(self):
         self.late(FAULT_US, 200_000)
-        kernel_rig.WITNESS["file"] = None  # Nobody watches where no machine is late.
+        kernel_rig.WITNESS["file"] = None  # There is no witness where no machine is late.
         self.assertEqual(("failed", 1), self.outcome(GAP))
 
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Rows 15 to 18 on a real `can` device: a fake slcan adapter with states, stalls, and a plug.
 
-The bus log is taken at the wheels' end. The echo of this kind of interface proves nothing, so a stalled adapter shows only by
-the wheels' silence or by a full queue; how many old frames come out afterwards is bounded by queue, driver and adapter.
+The bus log is recorded at the wheels' end. The echo of this kind of interface proves nothing. A stalled adapter is detected only by
+missing telemetry or by a full queue; queue, driver and adapter limit the number of old frames that come out afterwards.
 """
 
 import time
@@ -21,7 +21,7 @@ from scenarios.process import driving
 
 from .interface import back_to_driving, lose_interface, stale_after
 
-TTY_FRAMES = 40  # what a stalled pty, the driver and the queue hold at most, per measurement and with room
+TTY_FRAMES = 40  # what a stalled pty, the driver and the queue hold at most: measured, with a margin
 
 
 @kernel_test("nominal drive through an adapter", "adapter", 0, SlcanRig, pace=1)
@@ -56,12 +56,12 @@ ADAPTER_STATES = (
     (bus_states.row16_error_passive, lambda t: bus_states.error_passive(t, tell("passive"), tell("active"))),
     (bus_states.row16_error_flood, lambda t: bus_states.error_flood(t, burst, tell("active"))),
 )
-for there, here in ADAPTER_STATES:  # what the local bus's simulator does, done by the adapter
+for there, here in ADAPTER_STATES:  # the adapter does what the simulator does on the local bus
     add(there.__name__, REGISTRY[there.__name__][0], here, groups="adapter", row=16, rig=SlcanRig)
 
 
 def stalled(t, seconds, setup=None):
-    """The adapter takes nothing for that long; returns rig and what came out afterwards as [(t_us, id, mm/s)]."""
+    """The adapter accepts nothing for that long; returns the rig, and the frames that came out afterwards as [(t_us, id, mm/s)]."""
     rig = t.rig({"drive": {"accel_mm_s2": 2000}})
     rig.start_gateway(setup=setup)
     client = rig.client()
@@ -82,13 +82,13 @@ def stalled(t, seconds, setup=None):
 
 
 def bounded_residue(t, rig, back_us):
-    """Without a proof by echo old frames cannot be ruled out: few, quickly gone, and behind them zeros."""
+    """Without a proof by the echo, old frames are possible: few, within a short time, and followed by zeros."""
     time.sleep(0.5)
     late = rig.bus.setpoints(back_us)
     moving = [at for at, _, speed in late if speed]
     t.measure("stale_frames", len(moving))
     t.check(len(moving) <= TTY_FRAMES, f"{len(moving)} old frames came out, {TTY_FRAMES} allowed")
-    t.check(not moving or moving[-1] - back_us < 100_000, "old frames are gone within 100 ms")
+    t.check(not moving or moving[-1] - back_us < 100_000, "old frames end within 100 ms")
     for side in (LEFT, RIGHT):
         values = [speed for _, can_id, speed in late if can_id == side]
         t.check(not values or values[-1] == 0, f"the last frame of {side} is a zero: {values[-5:]}")
@@ -143,13 +143,13 @@ def power_cut(t, seconds, setup):
     time.sleep(0.3)
     stream.stop()
     t.check(client.request("status")["state"] == "latched", "latched")
-    t.check(not client.request("reset")["ok"], "reset waits until the wheels are heard")
+    t.check(not client.request("reset")["ok"], "reset is refused until the wheels are online")
     time.sleep(seconds)
     back_us = now_us()
     rig.sim.ask("power on")
     rig.note("alive")
     heard = rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"], 10)
-    t.check(heard, "the wheels are heard again")
+    t.check(heard, "the wheels are online again")
     time.sleep(0.5)
     late = rig.bus.setpoints(back_us)
     moving = [(at, side) for at, side, speed in late if speed]
@@ -163,14 +163,14 @@ def row18_power_cut_adapter(t):
     rig, client, back_us, late, moving = power_cut(t, 10, None)
     t.check(not late or all(speed == 0 for _, _, speed in late[-2:]), f"ends in zeros: {late[-3:]}")
     spread_us = moving[-1][0] - late[0][0] if moving else 0
-    t.check(spread_us < 20_000, f"old frames are through within {spread_us / 1000:.1f} ms of the first, 20 ms allowed")
+    t.check(spread_us < 20_000, f"old frames end within {spread_us / 1000:.1f} ms of the first, 20 ms allowed")
     judge_after_residue(t, rig, client, back_us)
 
 
 @kernel_test("adapter unplugged in motion and plugged in again: stop, found by name, no backlog", "adapter", 15, SlcanRig)
 def row15_unplugged(t):
     rig, client, stream = driving(t)
-    # The frame on its way to the adapter and its wheels' silence may be noticed before the kernel says that it is gone.
+    # The gateway may notice the unsent frame and the missing telemetry before the kernel reports that the adapter is gone.
     lose_interface(t, rig, client, stream, rig.adapter.unplug, ("bus_down", "send_stalled", "wheel_lost"))
     t.check(not rig.adapter.is_there(), "the interface is gone")
     time.sleep(1.0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the gateway passed on the local bus, again on SocketCAN: both must behave alike.
+"""The scenarios of the local bus, again on SocketCAN: both must behave in the same way.
 
 The functions are those of test/system; only the rig differs. Left out: what needs the simulator to be the bus (power that is
 cut, stalls), and floods that never wait, which would stop virtual time.
@@ -73,7 +73,7 @@ ON_VCAN = (
 ON_ADAPTER = ("nominal_drive_and_turn", "row01_client_killed", "row22_left_silent", "row25_killed", "row25_sigterm", "row30_two_gateways")
 REAL_TIME = ("nominal_drive_and_turn", "row01_client_killed", "row25_killed")
 REAL_TIME_FULL = ("row02_client_frozen", "row19_second_master_driving", "row24_stopped_250_ms", "row24_stopped_700_ms", "row25_sigterm", "row27_stderr_blocked")
-NEVER_WAIT = ("row05_many_observers", "row05_out_of_descriptors")  # in virtual time these would never end
+NEVER_WAIT = ("row05_many_observers", "row05_out_of_descriptors")  # these would never end in virtual time
 
 
 def row_of(name):

@@ -19,7 +19,7 @@ AS_DOCUMENTED = {"bitrate": 1_000_000, "sample-point": 0.625}
 
 
 def set_up(name, **timing):
-    """The interface as docs/user/deploy.md has it, with that timing instead."""
+    """The interface as in docs/user/deploy.md, but with that bit timing."""
     netdev.down(name)
     words = [word for key, value in {**AS_DOCUMENTED, **timing}.items() for word in (key, str(value))]
     netdev.command("ip", "link", "set", name, "type", "can", *words, "restart-ms", "100")
@@ -47,7 +47,7 @@ class ControllerRig(Rig):
         return self.interface
 
     def relisten(self):
-        """After the interfaces were set up anew."""
+        """After the interfaces were set up again."""
         self.bus.close()
         self.bus = self.listen(self.bus.frames)
 
@@ -68,7 +68,7 @@ def controller_nominal(t):
     bus = client.request("status")["bus"]
     wanted = {"name": rig.interface, "state": "active", "timing": "confirmed", "echo": "proven", "bitrate": 1_000_000}
     t.check({key: bus[key] for key in wanted} == wanted, f"bus {bus}")
-    t.check(abs(bus["sample_point_permille"] - 625) <= 5, f"what the controller's clock allows: {bus['sample_point_permille']}")
+    t.check(abs(bus["sample_point_permille"] - 625) <= 5, f"the nearest that the controller's clock allows: {bus['sample_point_permille']}")
     status = client.request("status")
     t.check(abs(status["left"]["speed_mm_s"] - 400) < 40, f"left {status['left']['speed_mm_s']} mm/s")
     t.check(stream.stop() is None, "the stream was not refused")
@@ -90,17 +90,17 @@ def controller_row15_down_and_up(t):
     t.judge(rig)
 
 
-@controller_test("a queue that takes nothing for 300 ms in motion: stop, nothing old afterwards", 17)
+@controller_test("a queue that accepts nothing for 300 ms in motion: stop, no old frame afterwards", 17)
 def controller_row17_no_buffers(t):
     row17_no_buffers(t)
 
 
-@controller_test("another sample point than the document's: told, and no arm", 0)
+@controller_test("another sample point than the document's: reported, and no arm", 0)
 def controller_sample_point(t):
     wrong_timing(t, **{"sample-point": 0.875})
 
 
-@controller_test("another bit rate than the document's on both: told, and no arm", 0)
+@controller_test("another bit rate than the document's on both: reported, and no arm", 0)
 def controller_bit_rate(t):
     wrong_timing(t, bitrate=500_000)
 
@@ -117,7 +117,7 @@ def wrong_timing(t, **timing):
     time.sleep(1.2)
     status = client.request("status")
     t.check(status["bus"]["timing"] == "contradicted", f"bus {status['bus']}")
-    t.check(any("sample-point 0.625" in warning for warning in status["warnings"]), f"warned of, with the cure: {status['warnings']}")
+    t.check(any("sample-point 0.625" in warning for warning in status["warnings"]), f"a warning with the fix: {status['warnings']}")
     reply = client.arm()
     t.check(not reply["ok"], f"no arm: {reply}")
     t.figure(f"{reply.get('error')}")
@@ -136,6 +136,6 @@ ALIKE = (
     "row25_sigterm",
     "row25_restart_beside_other_master",
 )
-for there in ALIKE:  # what the local bus passed
+for there in ALIKE:  # scenarios of the local bus
     title, _, function = REGISTRY[there]
     add(f"controller_{there}", title, function, groups="controllers", row=row_of(there), rig=ControllerRig, pace=1)

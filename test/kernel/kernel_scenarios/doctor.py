@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""iwheelctl doctor on interfaces of a real kernel: what it finds, and the command that mends it, which is then run."""
+"""iwheelctl doctor on interfaces of a real kernel: what it finds, and the command that fixes it, which the test then runs."""
 
 import json
 import subprocess
@@ -30,7 +30,7 @@ def expect(t, checks, check, verdict, text, cure=""):
     t.check(good, f"{check}: {verdict}, {text!r}, {cure!r} expected, found {finding}")
 
 
-@kernel_test("doctor without a gateway: interface, e-stop line, the command that mends it", "bus", 0)
+@kernel_test("doctor without a gateway: interface, e-stop line, the command that fixes it", "bus", 0)
 def doctor_on_vcan(t):
     rig = t.rig()
     time.sleep(0.6)
@@ -63,7 +63,7 @@ def doctor_on_vcan(t):
     t.rule(not rig.bus.setpoints(), "nothing was sent")
 
 
-@kernel_test("doctor on an adapter without bit timing: unproven is said, beside a gateway too", "adapter", 0, SlcanRig, pace=1)
+@kernel_test("doctor on an adapter without bit timing: reported as unproven, next to a gateway too", "adapter", 0, SlcanRig, pace=1)
 def doctor_on_an_adapter(t):
     rig = t.rig()
     time.sleep(0.6)

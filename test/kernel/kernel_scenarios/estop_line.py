@@ -14,7 +14,7 @@ from scenario import Skip
 from scenarios.estop import reset
 
 PRESSES, PRESSES_HIGH, PRESSES_REAL_TIME, PRESSES_FULL = 100, 25, 25, 1000
-SERIES = 100  # presses of one gateway: its recording has room in a small machine
+SERIES = 100  # presses of one gateway: its recording fits into a small machine
 SLOW = {"limits": {"wheel_silent_ms": 200}}
 PULSES_MS = (1, 2, 3, 5, 7, 10, 15, 20)
 
@@ -39,7 +39,7 @@ def one_press(t, rig, driver, other, chance):
 
 
 def series(t, count, chance):
-    """Presses on a rig of their own; what it recorded is judged, and forgotten if nothing is wrong with it."""
+    """Presses on a rig of their own. Its recording is judged, and deleted if it is correct."""
     rig, driver = t.running()
     other = rig.client("other")
     for _ in range(count):
@@ -68,7 +68,7 @@ def presses(t, count, seed):
         if t.failures:
             return
     if t.late_machine > 0.1 * count:
-        raise Skip(f"the machine was late beside {t.late_machine} of {count} presses; needs a quieter one")
+        raise Skip(f"the machine was late during {t.late_machine} of {count} presses; needs a quieter one")
     told(t)
     if t.late_machine:
         t.figure(f"{t.late_machine} presses do not count: the machine was late")
@@ -91,18 +91,18 @@ def row11_presses_adapter(t):
     presses(t, PRESSES_HIGH, t.plan["seed"] + 2)
 
 
-@kernel_test("presses in motion at random phase, by the clock on the wall", "realtime", 11)
+@kernel_test("presses in motion at random phase, in real time", "realtime", 11)
 def row11_presses_real_time(t):
     presses(t, PRESSES_REAL_TIME, t.plan["seed"] + 3)
 
 
 def add_real_time(number):
-    """One of the series of a thousand: each is repeated by itself where the machine was late."""
+    """One series of the thousand presses: each series is repeated on its own if the machine was late."""
 
     def run(t):
         presses(t, SERIES, t.plan["seed"] + 100 + number)
 
-    title = f"presses in motion at random phase, by the clock on the wall, series {number} of {PRESSES_FULL // SERIES}"
+    title = f"presses in motion at random phase, in real time, series {number} of {PRESSES_FULL // SERIES}"
     add(f"row11_real_time_{number:02d}", title, run, groups="realtime-full", row=11, rig=VcanRig)
 
 
@@ -183,7 +183,7 @@ def row11_two_lines(t):
     t.judge(rig)
 
 
-@kernel_test("one of two contacts shorted: told, and no reset until both were pressed, then released", "estop", 13, TwoContactsRig)
+@kernel_test("one of two contacts shorted: reported, and no reset until both were pressed, then released", "estop", 13, TwoContactsRig)
 def row13_line_shorted(t):
     rig, client = t.running()
     t.arm(client)
@@ -194,7 +194,7 @@ def row13_line_shorted(t):
     stream.stop()
     t.stopped_by(client, "estop_line")
     told_at(t, rig, client, "disagrees", "line")
-    t.check("estop_disagrees" in client.request("status")["present"], "the cause is there")
+    t.check("estop_disagrees" in client.request("status")["present"], "the cause is present")
     rig.release()
     for _ in range(3):
         time.sleep(0.5)
@@ -204,7 +204,7 @@ def row13_line_shorted(t):
     rig.second(False)
     time.sleep(0.5)
     t.expect(client.request("reset"), "cause_present")
-    t.rule(client.request("status")["state"] == "latched", "each contact alone mends nothing")
+    t.rule(client.request("status")["state"] == "latched", "one contact alone does not fix it")
     rig.chip.pull(False)
     rig.second(True)
     time.sleep(0.1)
@@ -218,7 +218,7 @@ def row13_line_shorted(t):
     t.judge(rig)
 
 
-@kernel_test("one line under two names as both contacts: no start, and the keys are named", "estop", 29, TwoContactsRig)
+@kernel_test("one line under two names as both contacts: no start, and the message names the keys", "estop", 29, TwoContactsRig)
 def row29_line_twice(t):
     rig = t.rig()
     rig.settings["estop"]["line2"] = f"{rig.chip.chip}:{rig.chip.OFFSET}"
@@ -278,9 +278,9 @@ def row13_pressed_at_start(t):
 
 
 def lost_chip(t, rig, client, after_s=0.6):
-    """Loses the line in motion, looks for a busy loop, finds it again, resets, drives.
+    """Loses the line in motion, checks for a busy loop, finds the line again, resets, drives.
 
-    Telemetry is slow, so that it does not happen to wake the gateway: the chip's going wakes nobody.
+    Telemetry is slow, so that it does not wake the gateway by chance: the removal of the chip wakes no process.
     """
     rig.sim.ask("slow 40")
     t.arm(client)
@@ -293,7 +293,7 @@ def lost_chip(t, rig, client, after_s=0.6):
     cpu, begin = rig.gateway.cpu_seconds(), time.monotonic()
     time.sleep(2.0)
     share = (rig.gateway.cpu_seconds() - cpu) / (time.monotonic() - begin)
-    t.check(share < 0.5, f"{100 * share:.0f} % CPU while the line is gone", True)
+    t.check(share < 0.5, f"{100 * share:.0f} % CPU without the line", True)
     refusal = client.request("reset")
     t.check(not refusal["ok"], "no reset without a line")
     rig.find_chip()
@@ -304,7 +304,7 @@ def lost_chip(t, rig, client, after_s=0.6):
     t.drive_for(client, 200, 200, 0.5)
 
 
-@kernel_test("the GPIO chip vanishes in motion, at every phase of the cycle, and comes back", "estop", 14)
+@kernel_test("the GPIO chip disappears in motion, at every phase of the cycle, and returns", "estop", 14)
 def row14_chip_vanishes(t):
     rig, client = t.running(SLOW)
     for after_s in (0.6, 0.603, 0.608, 0.612, 0.617):
@@ -314,7 +314,7 @@ def row14_chip_vanishes(t):
     t.judge(rig)
 
 
-@kernel_test("the GPIO chip vanishes in motion, by the clock on the wall", "realtime", 14)
+@kernel_test("the GPIO chip disappears in motion, in real time", "realtime", 14)
 def row14_chip_vanishes_real_time(t):
     rig, client = t.running(SLOW)
     lost_chip(t, rig, client)
@@ -350,7 +350,7 @@ def row14_line_busy(t):
     status = client.request("status")
     t.check(status["state"] == "latched" and status["estop"]["state"] == "unreadable", f"{status['state']}, {status['estop']}")
     text = rig.gateway.text()
-    t.check("busy" in text.lower(), f"the log says that it is busy: {text[-300:]}")
+    t.check("busy" in text.lower(), f"the log reports that it is busy: {text[-300:]}")
     t.expect(client.request("reset"), "estop_pressed")
     cpu, begin = rig.gateway.cpu_seconds(), time.monotonic()
     time.sleep(2.0)
@@ -387,7 +387,9 @@ def row13_button_tried(t):
     def untried(client):
         status = client.request("status")
         warned = any("never seen to work" in warning for warning in status["warnings"])
-        t.check(warned == (status["estop"]["tried_wall_us"] is None), f"warned of exactly while it is untried: {status['estop']}, {status['warnings']}")
+        t.check(
+            warned == (status["estop"]["tried_wall_us"] is None), f"the warning is present only while it is untried: {status['estop']}, {status['warnings']}"
+        )
         return warned
 
     def started():
@@ -402,14 +404,14 @@ def row13_button_tried(t):
         rig.gateway.end()
 
     client = started()
-    t.check(untried(client), "nobody has pressed it yet")
+    t.check(untried(client), "the button was not pressed yet")
     reply = client.request("arm", name="tester")
     t.check(reply["ok"] and any("never seen to work" in warning for warning in reply["warnings"]), f"arm warns: {reply}")
     client.request("stop")
     time.sleep(3)
     rig.press()
     time.sleep(0.3)
-    t.check(untried(client), "pressed is not yet tried")
+    t.check(untried(client), "a press alone does not test it")
     rig.release()
     time.sleep(1.5)
     t.check(not untried(client), "pressed and released")
@@ -421,7 +423,7 @@ def row13_button_tried(t):
     ended(client)
     rig.line = f"{rig.chip.chip}:{rig.chip.OFFSET}"
     client = started()
-    t.check(untried(client), "its line is configured otherwise")
+    t.check(untried(client), "its line has another configuration")
     t.arm(client)
     t.drive_for(client, 200, 200, 0.5)
     t.judge(rig)

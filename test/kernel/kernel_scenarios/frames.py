@@ -11,7 +11,7 @@ from scenarios.process import driving
 class Sender(threading.Thread):
     """Frames (id, data) of another process than the gateway, every `every` seconds, until stopped.
 
-    They go out by the recorder's socket, so that it knows them from the gateway's.
+    They are sent with the recorder's socket, so that the recorder distinguishes them from the gateway's.
     """
 
     def __init__(self, bus, frames, every):
@@ -63,6 +63,6 @@ def row21_low_ids(t):
     babble(t, (1, 2), 0.001)
 
 
-@kernel_test("a flood of unknown ids by the clock on the wall", "realtime", 21)
+@kernel_test("a flood of unknown ids in real time", "realtime", 21)
 def row21_real_time(t):
     babble(t, (0x600, 0x601, 0x602, 0x603), 0.002)

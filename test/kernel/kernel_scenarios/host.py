@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Rows 24, 27 and 30: clocks that jump, processes that stand still, disks that are full, a second gateway."""
+"""Rows 24, 27 and 30: clocks that jump, processes that are stopped, disks that are full, a second gateway."""
 
 import os
 import shutil
@@ -37,18 +37,18 @@ def row24_wall_clock(t):
     status = client.request("status")
     t.check(status["state"] == "armed", f"{status['state']}")
     off_s = abs(status["wall_us"] / 1e6 - time.time())
-    t.check(off_s < 1, f"status tells the new wall time, off by {off_s:.0f} s")
+    t.check(off_s < 1, f"status reports the new wall time, off by {off_s:.0f} s")
     client.request("stop")
     time.sleep(0.4)
     t.judge(rig)
 
 
-@kernel_test("the client's process stands still for 1 s: the lease stops it, its old commands move nothing", "host realtime-full", 24)
+@kernel_test("the client's process is stopped for 1 s: the lease stops the wheels, its old commands move nothing", "host realtime-full", 24)
 def row24_client_stopped(t):
     REGISTRY["row02_client_frozen"][2](t)
 
 
-@kernel_test("CPU starved: six hogs beside it; the gap holds or it stops from zero", "starved", 24)
+@kernel_test("no free CPU: six busy programs; the gap is within its limit, or it stops from zero", "starved", 24)
 def row24_starved(t):
     rig, client, stream = driving(t)
     hogs = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(6)]
@@ -67,11 +67,11 @@ def row24_starved(t):
         rig.timeline.append(Event(why["at_us"], "cut", within_us=200_000))
     client.request("stop")
     time.sleep(0.5)
-    t.judge(rig, pair_limit_us=GAP_US)  # the processor may be taken away between the wheels' frames; each wheel's gap is judged all the same
+    t.judge(rig, pair_limit_us=GAP_US)  # another program may run between the frames of the two wheels; each wheel's gap is judged anyway
 
 
 def full_disk(folder):
-    """A file system without a byte left."""
+    """A file system without a free byte."""
     os.makedirs(folder, exist_ok=True)
     subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", folder], check=True)
     try:
@@ -82,7 +82,7 @@ def full_disk(folder):
         pass
 
 
-@kernel_test("disk full where records go, then read-only: motion unaffected", "host", 27)
+@kernel_test("the disk of the recordings is full, then read-only: motion unaffected", "host", 27)
 def row27_disk_full(t):
     rig = t.rig()
     folder = rig.path("records")
@@ -113,7 +113,7 @@ def row27_disk_full(t):
         subprocess.run(["umount", "-l", folder], check=True)
 
 
-@kernel_test("strangers hold the names of the lock: the gateway starts, also after a kill in motion, and alone", "host", 30)
+@kernel_test("processes of other users hold the names of the lock: the gateway starts, after a kill in motion too, and only once", "host", 30)
 def row30_strangers(t):
     rig, _, stream = driving(t)
     names = lock_names(rig.gateway_bus())
@@ -139,7 +139,7 @@ def row30_strangers(t):
     t.judge(rig)
 
 
-@kernel_test("another user's gateway on the same interface gives way to root's", "host", 30)
+@kernel_test("another user's gateway on the same interface ends when root's starts", "host", 30)
 def row30_gives_way(t):
     rig = t.rig()
     folder = rig.path("theirs")
@@ -149,7 +149,7 @@ def row30_gives_way(t):
     command = rig.gateway_command("--socket", os.path.join(folder, "gateway.sock"), "--estop", "none")
     shutil.copy(rig.path("gateway.conf"), folder)
     command[command.index(rig.path("gateway.conf"))] = os.path.join(folder, "gateway.conf")
-    command[0] = shutil.copy(command[0], folder)  # The build may lie where only its owner comes, as in /root.
+    command[0] = shutil.copy(command[0], folder)  # The build may be in a folder that only its owner may enter, as in /root.
     os.chown(os.path.join(folder, "gateway.conf"), STRANGER, STRANGER)
     theirs = Process(command, rig.path("theirs.out"), become_stranger)
     rig.processes.append(theirs)
@@ -157,7 +157,7 @@ def row30_gives_way(t):
     rig.start_gateway()
     t.check(f"process {theirs.child.pid} of user 65534 holds" in rig.gateway.text(), f"named: {rig.gateway.text()[-400:]}")
     t.check(theirs.wait(5) == 69, "it ends")
-    t.check("goes before this one" in theirs.text(), f"and says why: {theirs.text()[-300:]}")
+    t.check("goes before this one" in theirs.text(), f"and prints the reason: {theirs.text()[-300:]}")
     again = Process(command, rig.path("again.out"), become_stranger)
     rig.processes.append(again)
     t.check(again.wait(5) == 69 and "another gateway already serves" in again.text(), f"nor starts: {again.text()[-300:]}")
@@ -167,7 +167,7 @@ def row30_gives_way(t):
     t.judge(rig)
 
 
-@kernel_test("the first gateway is killed: its interface is free again at once", "host", 30)
+@kernel_test("the first gateway is killed: its interface is free again immediately", "host", 30)
 def row30_after_a_crash(t):
     rig, _client = t.running()
     rig.kill_gateway(signal.SIGKILL)

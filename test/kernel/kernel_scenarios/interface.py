@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Rows 15 and 17 on vcan: interfaces that go down, vanish, refuse frames, echo late or never."""
+"""Rows 15 and 17 on vcan: interfaces that go down, disappear, refuse frames, echo late or never."""
 
 import os
 import re
@@ -17,14 +17,14 @@ from scenarios.process import driving
 
 UNITS = os.path.join(os.path.dirname(os.path.abspath(__file__)), *[os.pardir] * 3, "share", "systemd")
 BLINKS_MS = (0, 2.5, 5.3, 9.9, 13.1, 16.7, 19.9)  # later than the last command; a period is 20 ms
-REOPENED_MS = 260  # an interface that was down is looked for every 200 ms
-STALE_US = 20_000  # frames later than this after a bus came back were not on their way any more
+REOPENED_MS = 260  # the gateway searches every 200 ms for an interface that was down
+STALE_US = 20_000  # frames later than this after the return of a bus were not in transit any more
 
 
 def back_to_driving(t, rig, client):
-    """Both wheels are heard, reset is accepted, nothing moved by itself, and it drives again."""
+    """Both wheels are online, reset is accepted, nothing moved without a command, and it drives again."""
     heard = rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"] and s["bus"]["state"] == "active", 8)
-    if not t.check(heard, f"heard again: {client.request('status')['bus']}"):
+    if not t.check(heard, f"online again: {client.request('status')['bus']}"):
         return
     wait_reset(t, client)
     t.arm(client)
@@ -56,7 +56,7 @@ def fault(rig, action, within_ms, dead=True):
 
 
 def lose_interface(t, rig, client, stream, lose, causes=("bus_down",)):
-    """The interface goes in motion; the rest of the catalogue's row is checked by the caller."""
+    """The interface disappears in motion; the caller checks the rest of the row of the catalogue."""
     lost_us = fault(rig, lose, 60)
     time.sleep(0.3)
     stream.stop()
@@ -82,7 +82,7 @@ def row15_down_and_up(t):
     t.judge(rig)
 
 
-@kernel_test("interface down and up within a moment, at every phase of the cycle: stop all the same", "bus", 15)
+@kernel_test("interface down and up within a moment, at every phase of the cycle: it stops anyway", "bus", 15)
 def row15_blink(t):
     rig, client, stream = driving(t)
 
@@ -127,7 +127,7 @@ def row15_deleted_and_made_again(t):
     t.judge(rig)
 
 
-@kernel_test("no interface at start: it waits, and finds it when it comes", "bus", 15)
+@kernel_test("no interface at start: it waits, and finds it when it appears", "bus", 15)
 def row15_absent_at_start(t):
     rig = t.rig()
     rig.sim.end()
@@ -264,7 +264,7 @@ def row17_echo_too_late_at_arm(t):
     time.sleep(0.5)
     state = client.request("status")["state"]
     t.check(not reply["ok"] or state == "latched", f"arm without an echo in time: {reply}, {state}")
-    t.check(client.request("why")["cause"] == "send_stalled" or reply.get("error") == "send_stalled", "and says why")
+    t.check(client.request("why")["cause"] == "send_stalled" or reply.get("error") == "send_stalled", "and prints the reason")
     t.rule(not any(speed for _, _, speed in rig.bus.setpoints()), "nothing but zeros")
     netdev.discipline(rig.interface)
     back_to_driving_if_latched(t, rig, client)
@@ -273,7 +273,7 @@ def row17_echo_too_late_at_arm(t):
 def back_to_driving_if_latched(t, rig, client):
     time.sleep(1.2)
     heard = rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"], 5)
-    t.check(heard, "the wheels are heard")
+    t.check(heard, "the wheels are online")
     wait_reset(t, client)
     t.arm(client)
     t.drive_for(client, 200, 200, 0.5)
@@ -322,7 +322,7 @@ def restart_as_the_unit_does(t, interface):
 
 
 def told_by_the_tool(t, rig):
-    """What `iwheelctl why` and `doctor` say of it, in one text each."""
+    """The texts of `iwheelctl why` and `doctor` about it."""
 
     def ask(*words):
         return " ".join(
@@ -335,7 +335,7 @@ def told_by_the_tool(t, rig):
 
 
 def restart_as_doctor_says(t, rig):
-    """The commands, as they stand in its cure."""
+    """The commands in its fix."""
     commands = re.search(r"ip link set \S+ down; ip link set \S+ up", told_by_the_tool(t, rig)["doctor"])
     if t.check(commands is not None, "doctor names the commands"):
         for command in commands[0].split("; "):
@@ -343,7 +343,7 @@ def restart_as_doctor_says(t, rig):
 
 
 def lost_echo(t, cure):
-    """An echo gets lost while driving, and the gateway may not restart the link: told, and cured without starting it anew."""
+    """An echo gets lost while driving, and the gateway may not restart the link: reported, and fixed without a restart of the gateway."""
     rig = t.rig(LATE)
     needs_echo(rig)
     os.makedirs("/run/iwheel", exist_ok=True)
@@ -364,9 +364,9 @@ def lost_echo(t, cure):
     refused = client.request("reset")["message"]
     said = " ".join(client.request("status")["warnings"])
     for sentence in (refused, said):
-        t.check(f"ip link set {rig.interface} down; ip link set {rig.interface} up" in sentence, f"the cure is named: {sentence}")
+        t.check(f"ip link set {rig.interface} down; ip link set {rig.interface} up" in sentence, f"the fix is named: {sentence}")
     for what, text in {"a warning": said, **told_by_the_tool(t, rig)}.items():
-        t.check(f"ip link set {rig.interface} down; ip link set {rig.interface} up" in text, f"{what} names the cure: {text}")
+        t.check(f"ip link set {rig.interface} down; ip link set {rig.interface} up" in text, f"{what} names the fix: {text}")
         t.check(f"systemctl enable --now iwheel-can-restart@{rig.interface}.path" in text, f"{what} names the unit: {text}")
     told = [e["present"] for e in observer.collect(0.1) if e["event"] == "fault" and e["cause"] == "setpoint_left"]
     t.check(told == [True], f"the event comes: {told}")
@@ -374,7 +374,7 @@ def lost_echo(t, cure):
     cure(rig)
     back_to_driving_if_latched(t, rig, client)
     told = [e["present"] for e in observer.collect(0.1) if e["event"] == "fault" and e["cause"] == "setpoint_left"]
-    t.check(told == [True, False], f"and goes: {told}")
+    t.check(told == [True, False], f"and ends: {told}")
     t.check("still in the controller" not in " ".join(client.request("status")["warnings"]), "no warning remains")
     armed = [event.t_us for event in rig.timeline if event.kind == "arm" and event.ok and event.t_us > silent_us]
     t.rule(not [at for at, _, _ in rig.bus.setpoints(silent_us) if at < min(armed)], "nothing is sent before it is armed again")
@@ -394,7 +394,7 @@ def row17_echo_lost_unit_restarts(t):
 
 
 def power_cut(t, setup):
-    """Nobody acknowledges for 10 s at full command: frames are held back where the controller would retry them."""
+    """No node acknowledges for 10 s at full command. The frames are held back; a controller would retry them."""
     rig = t.rig({"drive": {"accel_mm_s2": 2000}})
     needs_echo(rig)
     netdev.discipline(rig.interface, "plug")

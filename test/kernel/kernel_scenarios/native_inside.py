@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""`test/kernel/run --native` on a kernel that has what it asks for: this one. The tests inside the test run in a network of their own."""
+"""`test/kernel/run --native` on a kernel with everything that it needs: this one. The tests inside the test run in a network of their own."""
 
 import os
 import re
@@ -9,7 +9,7 @@ import sys
 from boot import HERE
 from catalogue import kernel_test
 
-# The rig itself with a planted late gateways and an adapter, driving, a crash, a lost line.
+# The rig itself with seeded late gateways and an adapter, driving, a crash, a lost line.
 INSIDE = (
     "plumbing_vcan",
     "plumbing_discipline",
@@ -25,7 +25,7 @@ LIMIT_S = 300
 LAST_WORDS = 1500
 
 
-@kernel_test("--native runs the tests on a kernel's own interfaces and lines, and finds the planted fault", "plumbing", 0)
+@kernel_test("--native runs the tests on a kernel's own interfaces and lines, and finds the seeded fault", "plumbing", 0)
 def plumbing_native(t):
     command = [sys.executable, os.path.join(HERE, "run"), "--native", "--build", t.plan["build"], "--log-lines", "5"]
     for name in INSIDE:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The rig's own tests: what the other tests rest on does what they believe, and its faults are seen."""
+"""The rig's own tests: the parts that the other tests use work as these tests assume, and faults of the rig are detected."""
 
 import errno
 import os
@@ -36,7 +36,7 @@ def seen(bus, count, seconds=2.0):
     return bus.frames
 
 
-@kernel_test("vcan: the recorder sees every kind of frame, knows its own, and the time is right", EVERY_BOOT, 0)
+@kernel_test("vcan: the recorder receives every kind of frame, marks its own, and the time is right", EVERY_BOOT, 0)
 def plumbing_vcan(t):
     bus = fresh_bus("vcan9")
     with open_raw("vcan9") as other:
@@ -70,7 +70,7 @@ def plumbing_discipline(t):
         netdev.discipline("vcan9", "pfifo", "limit", "0")
         t.check(error_of(other) == errno.ENOBUFS, "pfifo limit 0 refuses")
         netdev.discipline("vcan9")
-        t.check(error_of(other) is None, "the default takes frames again")
+        t.check(error_of(other) is None, "the default accepts frames again")
         netdev.down("vcan9")
         t.check(error_of(other) == errno.ENETDOWN, "down is told")
         netdev.up("vcan9")
@@ -80,7 +80,7 @@ def plumbing_discipline(t):
 
 
 def error_of(sock):
-    """The error number of sending; one pending error of the socket is taken first."""
+    """The error number of sending; one pending error of the socket is read first."""
     try:
         sock.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
         sock.send(FRAME_512)
@@ -89,7 +89,7 @@ def error_of(sock):
         return error.errno
 
 
-@kernel_test("gpio-sim: a line with edges; a chip that vanishes under its reader", EVERY_BOOT, 0)
+@kernel_test("gpio-sim: a line with edges; a chip that disappears while its line is read", EVERY_BOOT, 0)
 def plumbing_gpio(t):
     chip = GpioChip(f"iwheel_test{os.getpid()}", "TEST")
     chip.pull(False)
@@ -110,17 +110,17 @@ def plumbing_gpio(t):
     time.sleep(0.1)
     chip.appear()
     chip.pull(True)
-    t.check(chip.level(), "back with the level that is pulled")
+    t.check(chip.level(), "it returns with the level of the pull")
     edges.close()
     chip.remove()
     t.check(not os.path.exists(chip.folder), "removed")
 
 
-@kernel_test("the simulator on an interface that comes up later: its wheels are there at once", EVERY_BOOT, 0)
+@kernel_test("the simulator on an interface that comes up later: its wheels are online immediately", EVERY_BOOT, 0)
 def plumbing_late_interface(t):
     bus = fresh_bus("vcan9")
     netdev.down("vcan9")
-    time.sleep(1.0)  # Since the kernel began: what the simulator may not take for a pause of its own.
+    time.sleep(1.0)  # Since the start of the kernel: the simulator must not count this as a pause of its own.
     command = [find_program(t.plan["build"], "iwheel-sim"), "--can", "vcan9", "--estop", "none"]
     simulator = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     time.sleep(0.7)
@@ -145,7 +145,7 @@ def hear_errors(interface):
 def plumbing_slcan(t):
     adapter = FakeSlcan()
     until = time.monotonic() + 1.0
-    while not adapter.open and time.monotonic() < until:  # it has a thread of its own
+    while not adapter.open and time.monotonic() < until:  # the adapter runs in its own thread
         time.sleep(0.01)
     t.check(b"S8" in adapter.commands and adapter.open, f"set up with {adapter.commands}")
     with hear_errors(adapter.interface) as sock:
@@ -161,7 +161,7 @@ def plumbing_slcan(t):
             can_id, _, _, _, data = FRAME.unpack(sock.recv(16))
             good = can_id & ERROR and (can_id & 0x40 if at is None else data[at] & bits)
             t.check(good, f"{state}: error frame {can_id:08X} {data.hex()}")
-        t.check("BUS-OFF" in netdev.command("ip", "-d", "link", "show", adapter.interface), "the kernel says bus-off")
+        t.check("BUS-OFF" in netdev.command("ip", "-d", "link", "show", adapter.interface), "the kernel reports bus-off")
         netdev.down(adapter.interface)
         netdev.up(adapter.interface)
         stall(t, adapter, sock)
@@ -175,7 +175,7 @@ def plumbing_slcan(t):
 
 
 def stall(t, adapter, sock):
-    """How many frames a stalled adapter swallows before the kernel says so, and that they come out stale."""
+    """The number of frames that a stalled adapter accepts before the kernel reports it; they come out stale."""
     sock.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
     taken = len(adapter.taken)
     adapter.stall(True)
@@ -190,4 +190,4 @@ def stall(t, adapter, sock):
     adapter.stall(False)
     time.sleep(0.5)
     t.check(len(adapter.taken) - taken == accepted, f"{len(adapter.taken) - taken} of {accepted} come out afterwards")
-    t.figure(f"a stalled adapter swallows {accepted} frames")
+    t.figure(f"a stalled adapter accepts {accepted} frames")

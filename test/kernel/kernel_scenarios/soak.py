@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Hours of one gateway under random faults. Each episode is judged as it ends and then forgotten."""
+"""Hours of one gateway under random faults. Each episode is judged at its end and then deleted."""
 
 import random
 import signal
@@ -20,11 +20,11 @@ SETTLE_EPISODES = 40  # memory is compared from here on: every kind of fault has
 MEMORY_kB = 64
 SLOW = "10"  # speed frames every 40 ms instead of 4, while idle and in nine episodes of ten; as documented in the tenth
 STUCK_S = 20.0
-PAUSE_S, ASLEEP_S = 20.0, 40.0  # the longest, between two episodes; wheels that sleep cost hardly anything, and some nine episodes of each kind are left
-ASLEEP_OF_A_DAY_S, DAY_H = 80.0, 4.0  # a soak longer than DAY_H has some hundred of each kind anyway
-TURNING_mm_s = 100  # the left wheel is told to do more than that, so that every episode turns a wheel
-WHOLE_H = 0.5  # a soak of so long must have met every kind of fault, and have settled
-# Linux 6.1 has 512 line numbers, and never gives back those of a chip that went while one of its lines was held.
+PAUSE_S, ASLEEP_S = 20.0, 40.0  # the longest, between two episodes; wheels that sleep cost hardly anything, and about nine episodes of each kind remain
+ASLEEP_OF_A_DAY_S, DAY_H = 80.0, 4.0  # a soak longer than DAY_H has about a hundred of each kind anyway
+TURNING_mm_s = 100  # the left wheel is commanded more than that, so that every episode turns a wheel
+WHOLE_H = 0.5  # a soak of this length must have had every kind of fault, and its memory must be stable
+# Linux 6.1 has 512 line numbers, and never frees those of a chip that was removed while one of its lines was requested.
 CHIPS_LOST_MAX = 50
 
 
@@ -42,7 +42,7 @@ class Soak:
     # Driving ----------------------------------------------------------------------------------------------------------
 
     def drive(self, seconds):
-        """Drives like a person who changes their mind; ends early when refused."""
+        """Drives with changing speeds; ends early when refused."""
         end = time.monotonic() + seconds
         while time.monotonic() < end:
             left = self.chance.choice((-1, 1)) * self.chance.randrange(TURNING_mm_s, 700)
@@ -59,7 +59,7 @@ class Soak:
         time.sleep(self.chance.uniform(low, high))
 
     def settle(self):
-        """Until it listens again: resets as often as it takes. Returns False if that takes too long."""
+        """Resets until the gateway listens again. Returns False if that takes too long."""
         end = time.monotonic() + STUCK_S
         while time.monotonic() < end:
             status = self.client.request("status")
@@ -109,7 +109,7 @@ class Soak:
             self.faults.remove(self.kind)
 
     def lose(self, command, side, within_ms):
-        """One wheel offline ends in a ramp, both in zero at once."""
+        """One wheel offline ends in a ramp, both offline in an immediate zero."""
         self.rig.fault(command, "cut" if side == "both" else "ramp", within_ms=within_ms)
 
     def fault_mute(self):
@@ -172,7 +172,7 @@ class Soak:
         self.client.request("stop")
 
     def fault_visitors(self):
-        """Observers, strays and half lines beside the owner."""
+        """Observers, invalid requests and half lines next to the owner."""
         for number in range(20):
             stray = Client(self.rig.path("gateway.sock"), [])
             if number % 3 == 0:
@@ -186,7 +186,7 @@ class Soak:
         self.client.request("stop")
 
     def idle(self):
-        """Nobody drives. Three times of four the wheels are asleep meanwhile, which saves the test most of its work."""
+        """No client drives. Three times of four the wheels sleep meanwhile, which saves the test most of its work."""
         asleep = self.chance.random() < 0.75
         if asleep:
             self.rig.sim.ask("mute both")
@@ -199,7 +199,7 @@ class Soak:
     # Judging ----------------------------------------------------------------------------------------------------------
 
     def one(self):
-        """One episode: arm, drive, one fault, undone; then silence, and the verdict. False: give up."""
+        """One episode: arm, drive, one fault and its end; then no commands, and the verdict. False: end the soak."""
         self.episode += 1
         self.kind = self.chance.choice(self.faults)
         self.counts[self.kind] = self.counts.get(self.kind, 0) + 1
@@ -263,7 +263,7 @@ def soak(t):
 
 
 def thorough(t, run, hours):
-    """It met every kind of fault, and long enough to compare memory; a shorter one than that says what it cannot judge."""
+    """It had every kind of fault, and ran long enough to compare memory. A shorter soak prints what it cannot judge."""
     missing = sorted(name[len("fault_") :] for name in set(run.faults) - set(run.counts))
     if t.failures:
         return

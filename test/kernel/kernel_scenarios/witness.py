@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The verdicts of real time can fail: a late gateway is found, a stalled machine is not taken for one, and excuses no motion."""
+"""The verdicts of real time can fail: a late gateway is found; a stalled machine does not count as one, and excuses no motion."""
 
 import os
 import signal
@@ -20,7 +20,7 @@ HALT_S, HALT_LIMIT_S = 0.2, 5.0
 
 
 class Rehearsal(GuestRun):
-    """The runner's verdict on a test of which nobody is told: it is planted. Run in this process, `attempts` times."""
+    """The runner's verdict on a test with a seeded fault, which is not reported. Run in this process, `attempts` times."""
 
     def __init__(self, t, function):
         folder = tempfile.mkdtemp(prefix="iwheel-rehearsal-")
@@ -39,7 +39,7 @@ class Rehearsal(GuestRun):
 
 
 def drive_while(halt, afterwards=None):
-    """A test that drives straight on while something stands still."""
+    """A test that drives on while a process or the machine is stopped."""
 
     def planted(t):
         rig, client = t.running()
@@ -64,24 +64,24 @@ def halt_gateway(_, rig):
 
 
 def halt_machine(t, _):
-    """The host makes this whole kernel stand still: see Boot.stall_as_asked."""
+    """The host stops this whole kernel: see Boot.stall_as_asked."""
     path = f"{t.plan['asks']}.stall"
     with open(path, "w", encoding="ascii") as file:
         file.write(str(HALT_S))
     end = time.monotonic() + HALT_LIMIT_S
     while os.path.exists(path):
         if time.monotonic() > end:
-            raise RuntimeError("the host did not make this kernel stand still")
+            raise RuntimeError("the host did not stop this kernel")
         time.sleep(0.02)
 
 
 def need_a_machine(t):
     if t.plan["native"]:
-        raise Skip("a machine's own kernel is not made to stand still; without --native this is tested")
+        raise Skip("a machine's own kernel is not stopped; without --native this is tested")
 
 
 def motion_after_estop(rig):
-    """What a gateway would send that does not stop: two pairs, written by somebody whom the judge takes for it."""
+    """Two pairs as a gateway would send them that does not stop; the judge counts them as the gateway's."""
     rig.press()
     time.sleep(0.1)
     with open_raw(rig.interface) as other:
@@ -98,7 +98,7 @@ def verdict_on(t, halt, afterwards=None):
     return verdict, rehearsal, [failure.text for failure in attempt.failures]
 
 
-@kernel_test("a gateway that stands still for 200 ms in motion fails the test at once, and the machine is not blamed", "plumbing-realtime", 0)
+@kernel_test("a gateway that is stopped for 200 ms in motion fails the test immediately, and the machine does not count as the cause", "plumbing-realtime", 0)
 def plumbing_gateway_halted(t):
     for _ in range(RETRIES):
         verdict, rehearsal, failures = verdict_on(t, halt_gateway)
@@ -106,31 +106,31 @@ def plumbing_gateway_halted(t):
             t.check(verdict == FAILED, f"{verdict} after {rehearsal.attempts} attempts: {failures}")
             t.figure(f"{verdict}: {len(failures)} failures")
             return
-    raise Skip("the machine was late beside each attempt; needs a quieter one")
+    raise Skip("the machine was late during each attempt; needs a quieter one")
 
 
-@kernel_test("a machine that stands still for 200 ms is not taken for a late gateway: repeated, then not judged", "plumbing-realtime", 0)
+@kernel_test("a machine that stalls for 200 ms does not count as a late gateway: repeated, then not judged", "plumbing-realtime", 0)
 def plumbing_machine_halted(t):
     need_a_machine(t)
     verdict, rehearsal, failures = verdict_on(t, halt_machine)
-    t.check(rehearsal.disturbed(), "the witness saw the machine stand still")
-    t.check(failures, "a machine that stood still left its traces")
+    t.check(rehearsal.disturbed(), "the witness detected the stall of the machine")
+    t.check(failures, "the stall of the machine is in the results")
     t.check(verdict == INCONCLUSIVE and rehearsal.attempts == RETRIES, f"{verdict} after {rehearsal.attempts} attempts: {failures}")
     t.figure(f"{verdict} after {rehearsal.attempts} attempts, {len(failures)} failures in the last")
 
 
-@kernel_test("a machine that stood still excuses no motion after the e-stop", "plumbing-realtime", 0)
+@kernel_test("a stalled machine excuses no motion after the e-stop", "plumbing-realtime", 0)
 def plumbing_machine_no_excuse(t):
     need_a_machine(t)
     verdict, rehearsal, failures = verdict_on(t, halt_machine, motion_after_estop)
-    t.check(rehearsal.disturbed(), "the witness saw the machine stand still")
+    t.check(rehearsal.disturbed(), "the witness detected the stall of the machine")
     t.check(verdict == FAILED and rehearsal.attempts == 1, f"{verdict} after {rehearsal.attempts} attempts")
     t.check(any(text.startswith("nonzero_after_estop") for text in failures), f"it is named: {failures}")
-    t.figure(f"{verdict} although the machine stood still")
+    t.figure(f"{verdict} although the machine stalled")
 
 
 def late_press(t, delay):
-    """A press in motion while `delay(rig)` keeps something from working for LATE_S. Returns (latencies from edge and level, whether the machine was late)."""
+    """A press in motion while `delay(rig)` stops a process or the machine for LATE_S. Returns (latencies from edge and level, whether the machine was late)."""
     rig, client = t.running()
     t.arm(client)
     stream = Streamer(client, 300, 300)
@@ -147,7 +147,7 @@ def late_press(t, delay):
     levels = [us for _, us in t.from_level]
     t.from_level.clear()
     late = machine_late(edge_us - TICK_US, edge_us + LEVEL_US, PRESS_LATE_US)
-    return max(found, default=0), max(levels, default=0), late or not levels  # or the contact itself moved too slowly to tell
+    return max(found, default=0), max(levels, default=0), late or not levels  # or the contact itself moved too slowly to decide
 
 
 def stop_gateway(rig):
@@ -160,13 +160,13 @@ def stop_gateway(rig):
     return later
 
 
-@kernel_test("a gateway that stands still for 30 ms at a press is found out, and the machine is not blamed", "plumbing-realtime", 0)
+@kernel_test("a gateway that is stopped for 30 ms at a press is detected, and the machine does not count as the cause", "plumbing-realtime", 0)
 def plumbing_late_gateway(t):
     for _ in range(RETRIES):
         latency_us, level_us, disturbed = late_press(t, stop_gateway)
         if not disturbed:
-            t.check(latency_us > ESTOP_US, f"{latency_us / 1000:.2f} ms measured although the gateway stood still for 30 ms")
-            t.check(level_us > LEVEL_US, f"{level_us / 1000:.2f} ms from the level although the gateway stood still for 30 ms")
+            t.check(latency_us > ESTOP_US, f"{latency_us / 1000:.2f} ms measured although the gateway was stopped for 30 ms")
+            t.check(level_us > LEVEL_US, f"{level_us / 1000:.2f} ms from the level although the gateway was stopped for 30 ms")
             t.figure(f"{latency_us / 1000:.0f} ms measured, {level_us / 1000:.0f} ms from the level")
             return
-    raise Skip(f"the machine was late beside each of {RETRIES} presses; needs a quieter one")
+    raise Skip(f"the machine was late during each of {RETRIES} presses; needs a quieter one")
