@@ -138,16 +138,17 @@ RULES = {
     "envelope": "R8: the last check",
     "sender": "R5: both or none",
     "confirmation": "R6: no queue of old setpoints",
-    "follow": "a wheel that is faster, blocked or turns backwards",
-    "diverge": "P1: the pair diverges",
-    "watch_pair": "P1: the pair diverges",
-    "yaw": "P2: yaw",
-    "current": "P4: current",
+    "follow": "R13: a wheel is too fast, blocked or turns backwards",
+    "diverge": "R14: the pair diverges",
+    "watch_pair": "R14: the pair diverges",
+    "yaw": "R17: limits of turning",
+    "current": "R14: current limits",
     "permit": "R2, R3: permission, causes and states",
     "cause": "R2, R3: permission, causes and states",
     "codec": "frames",
     "wheel": "frames",
-    "age": "ages of everything",
+    "rolling": "R13: the machine rolls without setpoints",
+    "age": "ages of all messages",
     "step": "the step itself",
     "gateway": "the step itself",
 }
@@ -186,7 +187,7 @@ def arm_steps(work, cpu, more=()):
     did = (idle_sent, received, seen, pair_sent, faster, ramp_sent)
     if did != (0, 1, 1, 1, 1, 1):
         raise SystemExit(f"the steps of test/bench/step did other work: {did}")
-    return {"nothing due": idle, "a frame in": frame, "a pair due": pair, "a pair due, of a ramp": ramp, "a look at everything": observe}
+    return {"nothing due": idle, "a frame in": frame, "a pair due": pair, "a pair due, of a ramp": ramp, "a snapshot": observe}
 
 
 def status_events(build):

@@ -72,9 +72,9 @@ def keep_driving(client, quit_it):
 
 
 # The work of a state, and the number of its clients: the most expensive first.
-STATES = {"driving": (drive, 1), "one client watching at 50 Hz": (watch, 1), "a client": (quiet, 1), "nobody": (None, 0)}
+STATES = {"driving": (drive, 1), "one client watching at 50 Hz": (watch, 1), "one client": (quiet, 1), "no client": (None, 0)}
 # Limits of system calls and of instructions. Tracing delays a driving gateway, so its instructions are not counted.
-LIMITS = {"driving": (2.5, None), "one client watching at 50 Hz": (2.5, 7000), "a client": (2.5, 3000), "nobody": (2.5, 1050)}
+LIMITS = {"driving": (2.5, None), "one client watching at 50 Hz": (2.5, 7000), "one client": (2.5, 3000), "no client": (2.5, 1050)}
 
 
 def in_state(pair, client_type, state, count):

@@ -11,7 +11,7 @@ PAGE = ROOT / "docs/developer/speed.md"
 README = ROOT / "README.md"
 PROCESS = "## The gateway as a process"
 BUILDS = "## Building and installing"
-TIMED = "## Beside floor and peers"
+TIMED = "## Compared with floor and peers"
 README_ROWS = {  # Row of the page, and its name in the README.
     "x86-64 decode": "read a frame, id and length checked: instructions on x86-64",
     "x86-64 encode": "write a setpoint, held within its limits: instructions on x86-64",
@@ -94,7 +94,7 @@ def put_timed(rows):
             f"Made by `test/bench/run --timed` on {machine()}. All candidates run in turns in one boot of the kernel of test/kernel: Linux 6.1 as an "
             "ordinary process, with one processor, vcan and gpio-sim. There a system call costs much more than on bare metal, "
             "so a program with fewer calls has a larger advantage; absolute times mean nothing, ratios to the floor more. The floor is the leanest program that "
-            "does only this (`test/bench/timed/floor_*.c`); *leanest that looks* is the leanest that reads bus and e-stop before it acts, as a program that drives "
+            "does only this (`test/bench/timed/floor_*.c`); *leanest that reads the e-stop* is the leanest that reads bus and e-stop before it acts, as a program that drives "
             "a person must (`floor_looks.c`). Medians of three rounds; a turn in which a program that sleeps a millisecond was woken "
             "10 ms late is repeated. The gateway runs with priority -10, as in its unit, and each socket may have a buffer of 4 MiB, as the package's "
             "sysctl allows; with the kernel's own 208 KiB the gateway lost 26 to 37 % of a full bus next to four programs that compute. System calls are counted in virtual time, where each frame comes alone, however slow the tracing is.",

@@ -153,10 +153,10 @@ def rows(measured):
         gap_us = middle((watchers, hostile), "gap_p99") - alone_us
         share = middle((watchers, hostile), "cpu") - idle
         if hostile:
-            yield (f"one who floods, {watchers} watchers: gap p99 added", f"{gap_us / 1000:+.2f} ms", "≤ 1 ms")
+            yield (f"a client that floods, {watchers} watchers: gap p99 added", f"{gap_us / 1000:+.2f} ms", "≤ 1 ms")
         elif watchers == MANY:
             yield (
-                f"{watchers} watching everything at 100 Hz, frames too: gap p99 added, processor in all",
+                f"{watchers} watching all topics and frames at 100 Hz: gap p99 added, processor of all",
                 f"{gap_us / 1000:+.2f} ms, {share:.1%}",
                 "≤ 1 ms, ≤ 8%",
             )

@@ -23,7 +23,7 @@ ALL = ("calls", "period_idle", "period_loaded", "flood", "flood_loaded", "line",
 COUNTED = ("calls",)  # in virtual time: each frame comes at its own moment, however long it takes to trace the calls
 FULL = {"rounds": 3, "period_s": 4.0, "flood_s": 3.0, "calls_s": 3.0, "count": 150, "presses": 12}
 SHORT = {"rounds": 1, "period_s": 0.6, "flood_s": 0.3, "calls_s": 0.5, "count": 10, "presses": 1, "stall_us": 1_000_000}
-# Limits of the smoke test: a figure beyond is wrong by orders of magnitude, whatever else the machine does.
+# Limits of the smoke test: a figure beyond is far too large for any load of the machine.
 ABSURD = {"ppm": 20_000, "lost": 3_000, "per_frame": 20, "p50": 100_000}
 LIMIT_S = 1800
 SMOKE_LIMIT_S = 120
@@ -122,9 +122,9 @@ def measure(build, request, measures=ALL, candidates=None, limit_s=LIMIT_S, show
 
 NAMES = {
     "bcm": "CAN_BCM",
-    "looks": "leanest that looks",
+    "looks": "leanest that reads the e-stop",
     "driving": "gateway that drives",
-    "attended": "gateway beside a client",
+    "attended": "gateway with a client",
     "python_can": "python-can",
     "gpiomon": "gpiomon and cansend",
 }
@@ -200,7 +200,7 @@ def loaded_flood_rows(measured):
         of = measured["flood_loaded"]
         lost = {c: sum(figures["lost"] for figures in of[c]) / sum(figures["sent"] for figures in of[c]) for c in of}
         yield row(
-            "21 000 frames/s beside four programs that compute: lost",
+            "21 000 frames/s next to four programs that compute: lost",
             f"{lost['floor']:.1%}",
             f"{lost['gateway']:.1%}",
             peers_of(of, lambda c: f"{lost[c]:.1%}"),
