@@ -318,7 +318,7 @@ class Bringup(unittest.TestCase):
         self.assertFalse(os.path.exists(self.out))
 
     def held_during_the_tries(self):
-        """Somebody holds both wheels from the first question of the role on; the operator goes on."""
+        """Both wheels are held from the first question about the role on; the operator continues."""
         self.rig.sim.ask("role setpoint")
         operator = self.begin()
         operator.answer("types to try", "7")
@@ -447,7 +447,7 @@ class Bringup(unittest.TestCase):
         time.sleep(0.3)
         quiet = len(self.rig.bus.setpoints())
         time.sleep(0.5)
-        self.assertEqual(quiet, len(self.rig.bus.setpoints()), "nobody sends any more")
+        self.assertEqual(quiet, len(self.rig.bus.setpoints()), "nothing is sent any more")
 
     def test_killed_bringup_ends_its_gateway(self):
         operator = self.begin()

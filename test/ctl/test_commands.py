@@ -190,7 +190,7 @@ ITEMS = ["setpoint_type", "current_role", "force_unit_left", "wheel_radius", "tr
 
 
 class Completion(unittest.TestCase):
-    """What each shell offers is what the program says of itself; asked as the shell asks."""
+    """Each shell offers exactly the words that the program lists; the test requests them as the shell does."""
 
     def environment(self):
         folders = [os.path.dirname(os.path.abspath(find_program(BUILD, name))) for name in ("iwheelctl", "iwheel-gateway", "iwheel-sim")]

@@ -228,7 +228,7 @@ class CarriedOut(unittest.TestCase):
         return status
 
     def next_step(self):
-        """What `status` says is to be done."""
+        """The action that `status` prints."""
         out = self.ctl("status")[1]
         return " ".join(out[out.index("next") : out.index("last stop")].removeprefix("next").split())
 
@@ -365,7 +365,7 @@ class CarriedOut(unittest.TestCase):
             simulator.terminate()
 
     def settle(self, item, make):
-        """Makes the contradiction, does what doctor says, and doctor says it no more."""
+        """Makes the contradiction and runs doctor's fix; then doctor does not report it any more."""
         make()
         self.wait_for(lambda s: s["ledger"][item]["state"] == "contradicted", item)
         fix = self.doctor()["ledger"]["cure"]
@@ -498,7 +498,7 @@ class Check(unittest.TestCase):
 
     def test_record_directory_of_somebody_else(self):
         if os.geteuid() != 0:
-            self.skipTest("needs root to become somebody else")
+            self.skipTest("needs root to become another user")
         os.chmod(self.rig.folder, 0o755)
         os.mkdir(self.rig.path("theirs"), 0o755)
         self.set("record", directory=self.rig.path("theirs"))

@@ -84,9 +84,9 @@ class Connecting(WithGateway):
         self.assertEqual(0, self.ctl("status", env={"IWHEEL_SOCKET": "/nonexistent"})[0])
         self.assertEqual(69, run("status", env={"IWHEEL_SOCKET": "/nonexistent"})[0])
 
-    @unittest.skipUnless(os.geteuid() == 0, "needs root to become somebody else")
+    @unittest.skipUnless(os.geteuid() == 0, "needs root to become another user")
     def test_permission_names_the_group_and_the_command(self):
-        # The program itself must be reachable for that somebody, so it is started from an open descriptor.
+        # That user must be able to run the program, so it is started from an open descriptor.
         os.chmod(self.gateway.folder.name, 0o755)
         os.chmod(self.gateway.path, 0o660)
         descriptor = os.open(PROGRAM, os.O_RDONLY)
@@ -751,7 +751,7 @@ class Driving(WithGateway):
             self.assertIn("interrupted after", err)
             self.assertLess(gateway.times("stop")[0] - sent, 0.1)
             self.assert_stopped_once(gateway)
-            # One status before arming; then until 0.2 s after the stop, when the wheels stand.
+            # One status before arming; then until 0.2 s after the stop, when the wheels are at standstill.
             self.assertGreater(gateway.times("status")[-1] - gateway.times("stop")[0], 0.2)
 
     def test_signal_before_the_first_answer_counts_no_time(self):
@@ -933,7 +933,7 @@ class Watching(WithGateway):
 
         gateway = self.serve(Flood)
         process = start("--socket", gateway.path, "watch")
-        wait_until(lambda: gateway.done)  # Nobody reads, and still the gateway gets rid of all of them.
+        wait_until(lambda: gateway.done)  # The output of iwheelctl is not read, but iwheelctl still receives all events.
         time.sleep(0.2)
         lines = []
         while not lines or lines[-1].get("number") != Flood.total - 1:

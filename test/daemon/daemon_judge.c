@@ -52,7 +52,7 @@ static struct {
     iw_time_us_t gone_us[CLIENTS];
     iw_time_us_t gone_stolen_us[CLIENTS];
     iw_time_us_t may_send_until_us; ///< The gateway may send until this time; 0: not at all.
-    iw_time_us_t armed_us;          ///< Time when the gateway read an arm in silence.
+    iw_time_us_t armed_us;          ///< Time when the gateway read an arm while it sent nothing.
     iw_time_us_t moved_us;          ///< Time of the last accepted nonzero setpoint: zeros are held from then on.
     iw_time_us_t fault_us;          ///< Time of the last fault of the bus.
     iw_time_us_t fault_stolen_us;

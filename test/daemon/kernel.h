@@ -59,9 +59,9 @@ typedef struct {
     uint64_t calls;            ///< Calls of all lives.
     uint64_t waits;            ///< Waits of the loop, contained in `calls`.
     uint64_t failed;           ///< Calls that the test made fail, contained in `calls`.
-    uint64_t kill_at;          ///< The process dies in the call with this number; 0: in none.
+    uint64_t kill_at;          ///< The process is killed in the call with this number; 0: in none.
     bool kill_after;           ///< After it has taken effect.
-    bool doomed;               ///< It dies before it does anything else.
+    bool doomed;               ///< It is killed before the call has an effect.
     iw_time_us_t failed_us;    ///< When a call was made to fail last.
     iw_time_us_t failed_stolen_us;
     bool marker_failed;     ///< The last call on the crash marker failed.

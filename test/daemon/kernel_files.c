@@ -137,7 +137,7 @@ ssize_t __wrap_write(int fd, const void *bytes, size_t size) {
     static const int errors[] = {EAGAIN, EINTR, 0};
     (void)((fd > STDERR_FILENO) ? vk_fd(fd) : NULL);
     if (vk.trace) {
-        printf("  %11.6f s    says: %.*s", (double)vk.now_us / 1e6, (int)size, (const char *)bytes);
+        printf("  %11.6f s    prints: %.*s", (double)vk.now_us / 1e6, (int)size, (const char *)bytes);
     }
     return vk_call("write", errors) ? vk_done((long)size) : -1;
 }
@@ -150,7 +150,7 @@ ssize_t __wrap_pread(int fd, void *out, size_t size, off_t offset) {
     return vk_done((long)count);
 }
 
-/// When the process dies, only a part may be written.
+/// When the process is killed, only a part may be written.
 ssize_t __wrap_pwrite(int fd, const void *bytes, size_t size, off_t offset) {
     (void)vk_call("pwrite", NULL);
     file_t *file = &files[vk_fd(fd)->number];

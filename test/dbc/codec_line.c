@@ -5,7 +5,7 @@
 //     encode ID VALUE...         ->  ID HEXBYTES
 //     row N                      ->  ID LENGTH PERIOD_MS KIND SIDE of the core's table
 //
-// Values stand in the order of the frame's bytes. Ids are decimal.
+// Values are in the order of the frame's bytes. Ids are decimal.
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -41,7 +41,7 @@ SYMBOLS = re.compile(
 
 
 class Broken(Exception):
-    """The fault cannot be applied or judged; the text says why."""
+    """The fault cannot be applied or judged; the text has the reason."""
 
 
 class Hunk(NamedTuple):

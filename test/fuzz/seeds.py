@@ -338,7 +338,7 @@ def codec():
 
 
 def candump():
-    """Parts of the log: where the gateway is silent, where it drives, where it stops."""
+    """Parts of the log: where the gateway sends nothing, where it drives, where it stops."""
     lines = [line for line, *_ in frames()]
     first = next(at for at, frame in enumerate(frames()) if frame[3])
     return ["\n".join(part).encode() for part in (lines[:20], lines[first - 5 : first + 25], lines[-20:], [line for line, *_ in some_of_each(3)])]

@@ -453,7 +453,7 @@ def test_network_that_drops_all_is_noticed_and_no_stop_is_lost(rig):
     line.frozen = False
     until(lambda: numbers(far) == list(range(1, last + 1)), 40, "all three")
     settle(far)
-    far.print_figures("network that swallows everything, noticed after 1.5 times `keepalive_s` (`--full`)")
+    far.print_figures("network that loses everything, noticed after 1.5 times `keepalive_s` (`--full`)")
 
 
 def test_bridge_killed_with_stored_events_each_stop_comes_once(rig):
@@ -502,7 +502,7 @@ def test_disk_full_events_wait_in_memory_and_are_reported(rig):
     until(lambda: numbers(far) == list(range(1, last + 1)), 20, f"all {last}")
     until(lambda: "on its disk again" in rig.bridge.text(), what="the disk is used again")
     settle(far)
-    far.print_figures("disk full at 2 kB: events stored in memory, `on_disk` and the log say so")
+    far.print_figures("disk full at 2 kB: events stored in memory, `on_disk` and the log report it")
 
 
 def test_clock_that_steps_changes_neither_ages_nor_order(rig):

@@ -113,7 +113,7 @@ def test_three_servers_leader_killed_each_stop_once_in_order(rig):
 
 
 def test_confirmation_does_not_wait_for_a_stream_of_yours(rig):
-    """docs/user/mqtt.md says of nats-server: a stream that accepts nothing withholds no confirmation, so a stream alone proves nothing."""
+    """docs/user/mqtt.md states about nats-server: a stream that accepts nothing withholds no confirmation, so a stream alone proves nothing."""
     if not shutil.which("nats-server"):
         raise Skip("nats-server is missing (scripts/install_tools check brings it)")
     port, mqtt = free_port(), free_port()

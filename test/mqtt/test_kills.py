@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The history of a fleet while nats-servers die: events missing in the stream are reported. IWHEEL_KILLS=100 pytest test/mqtt -k kills for the long form."""
+"""The history of a fleet while nats-servers are killed: events missing in the stream are reported. IWHEEL_KILLS=100 pytest test/mqtt -k kills for the long form."""
 
 import contextlib
 import json

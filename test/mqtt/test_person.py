@@ -126,7 +126,7 @@ def test_one_person_drives_and_the_second_is_busy(rig):
     assert all(speed >= 0 for t_us, _, speed in rig.bus.setpoints(begun_us)), "nothing of ben's was driven"
     until(lambda: [json.loads(text) for text in second.texts("reply/ben") if '"cmd":"drive"' in text and '"not_holder"' in text][1:], what="ben is refused")
     hand.end()
-    until(lambda: rig.gateway_state()["state"] == "listening", what="silence stops")
+    until(lambda: rig.gateway_state()["state"] == "listening", what="the wheels stop without commands")
     with first.lock:
         shown = {topic for topic, payload, *_ in first.all if key.encode() in payload and "/cmd/" not in topic}
     assert shown == {f"iwheel/{ID}/reply/anna"}, shown

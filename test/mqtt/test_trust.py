@@ -171,7 +171,7 @@ def test_stranger_on_loopback_gets_no_password_and_no_command(rig):
     for how in ("accepts", "waits"):  # The kernel shows root as the owner of a connection that is not accepted yet.
         stranger = Process([sys.executable, "-c", LISTENER, str(rig.port), how], rig.path(f"{how}.out"))
         rig.processes.append(stranger)
-        until(lambda one=stranger: "listens" in one.text(), what="the stranger listens")
+        until(lambda one=stranger: "listens" in one.text(), what="the other user's process listens")
         bridge = rig.start_bridge()
         until(lambda one=bridge: "belongs to user 65534" in one.text() or "names no owner" in one.text(), 10, f"refused: {bridge.text()}")
         time.sleep(2)

@@ -216,7 +216,7 @@ def differences(what, documented, wanted):
 
 
 def gateway_words(description):
-    """Words that a C source knows and the description does not, and the reverse."""
+    """Words that a C source has and the description does not, and the reverse."""
     for kind, sources in SOURCES.items():
         known, wanted = {}, set(description.words[kind])
         for path, function, others in sources if isinstance(sources, list) else [sources]:

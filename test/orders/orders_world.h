@@ -18,7 +18,7 @@ typedef enum {
     STEP_ARM,
     STEP_COMMAND,
     STEP_KILL,    ///< The client's connection ends and another client connects.
-    STEP_RESTART, ///< The gateway's process dies and runs again.
+    STEP_RESTART, ///< The gateway's process is killed and runs again.
     STEP_BUS,     ///< The bus goes down, or up again.
     STEP_KINDS,
 } world_step_t;

@@ -30,7 +30,7 @@ typedef struct {
     uint32_t first, count;
 } machine_t;
 
-/// Starts with wheels that have been on for a while and are at standstill; nobody drives them.
+/// Starts with wheels that have been on for a while and are at standstill; no client drives them.
 void machine_init(machine_t *self, const sim_pair_config_t *pair, const iw_config_t *config, uint64_t seed);
 
 /// The default configuration for this machine; `pair_mm` replaces the default unless it is 0.

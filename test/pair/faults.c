@@ -122,7 +122,7 @@ static bool play_row(const fault_t *fault, situation_t situation, uint16_t pair_
     return good;
 }
 
-/// One wheel is offline: nobody knows what it does meanwhile.
+/// One wheel is offline: its motion is unknown meanwhile.
 typedef enum { OBEYS, COASTS, BRAKES, OFFLINES } offline_t;
 static const char *const offlines[OFFLINES] = {"obeys", "coasts", "brakes"};
 /// The machine must not turn by more than this, whatever the wheel does.

@@ -94,7 +94,7 @@ def lifecycle(t):
     hardware.close()
 
 
-@scenario("hardware interface: every error ends the lease: NaN, a stop, an e-stop, a wheel offline, a gateway that dies", 40)
+@scenario("hardware interface: every error ends the lease: NaN, a stop, an e-stop, a wheel offline, a gateway that is killed", 40)
 def errors(t):
     hardware = Hardware(t)
 

@@ -70,7 +70,7 @@ def messages(t):
     t.judge(ride.rig)
 
 
-@scenario("the odometry is where the wheels have gone", 12)
+@scenario("the odometry is at the position that the wheels have reached", 12)
 def odometry(t):
     ride = Ride(t)
     odom = ride.peer.reader("odom", "nav_msgs/msg/Odometry", depth=200)
@@ -293,7 +293,7 @@ def stops_are_seen(t):
         t.check(any(part in text for text in words), f"{name}: {words}")
 
     def again():
-        """The stream has continued all the time: nothing moves. After reset and silence it may."""
+        """The stream has continued all the time: nothing moves. After a reset and a pause of the stream it may move them."""
         t.check(ride.still(0.5), "continued commands start nothing")
         stream.stop()
         ride.reset()
@@ -463,13 +463,13 @@ def auto_arm(t):
     time.sleep(0.6)
     stream = ride.stream(0.3)
     time.sleep(0.8)
-    t.check(ride.moving(), "a command after silence arms and drives")
+    t.check(ride.moving(), "a command after a pause arms and drives")
     stream.stop()
     ride.silence()
     time.sleep(0.6)
     stream = ride.stream(0.3, writer=stream.writer)
     time.sleep(0.8)
-    t.check(ride.moving(), "after its own silence too")
+    t.check(ride.moving(), "after its own pause too")
     stream.stop()
     ride.silence()
     t.check(ride.peer.call("iwheel/stop") == (True, ""), "a person stops a machine at standstill")
@@ -480,7 +480,7 @@ def auto_arm(t):
     time.sleep(1.2)
     stream = ride.stream(0.3, writer=stream.writer)
     time.sleep(0.8)
-    t.check(ride.moving(), "after silence of the source it arms again")
+    t.check(ride.moving(), "after a pause of the source it arms again")
     ride.rig.press()
     ride.rig.release()
     stream.stop()

@@ -128,12 +128,12 @@ def services(t, vendor):
     t.judge(ride.rig)
 
 
-@scenario("what a user types: the graph, the topics, QoS, domains, as the page says (Fast DDS)", 60)
+@scenario("what a user types: the graph, the topics, QoS, domains, as on the page (Fast DDS)", 60)
 def typed_graph_fastrtps(t):
     graph(t, "fastrtps")
 
 
-@scenario("what a user types: the graph, the topics, QoS, domains, as the page says (CycloneDDS)", 60)
+@scenario("what a user types: the graph, the topics, QoS, domains, as on the page (CycloneDDS)", 60)
 def typed_graph_cyclonedds(t):
     graph(t, "cyclonedds")
 
@@ -336,7 +336,7 @@ def typed_bag(t):
     t.judge(typed.ride.rig, moves=False)
 
 
-@scenario("the gamepad node: no zero-length hold drives on; it ends by release, silence, a bad axis; it begins after a release only", 2)
+@scenario("the gamepad node: no zero-length hold drives on; it ends by release, by missing reports, by a bad axis; it begins after a release only", 2)
 def gamepad_deadman(t):
     code = Path(ROOT, "share/ros2/iwheel_bringup/scripts/joystick.py").read_text(encoding="utf-8")
     pure = "import math\n" + code[code.index("ZEROS_S =") : code.index("class JoystickNode")]

@@ -51,7 +51,7 @@ def read_replies(client, count, seconds=3.0):
 
 def end_well(t, rig, client=None):
     client = client or rig.client()
-    t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 6), "silence at the end")
+    t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 6), "nothing is sent at the end")
     t.judge(rig)
 
 
@@ -126,7 +126,7 @@ def relay_stopped(t):
             t.check(span > 0.3, f"closed after {span} s")
             client = rig.client()
         time.sleep(0.5)
-        t.check(not rig.moving(resumed_us + 250_000), f"no motion begins after {span} s of silence")
+        t.check(not rig.moving(resumed_us + 250_000), f"no motion begins after {span} s without commands")
         t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 6), "listening")
     t.judge(rig)
 

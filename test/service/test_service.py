@@ -67,7 +67,7 @@ def values(unit, key):
 
 
 def complaints_of_udev(rules):
-    """udev's complaints about a file of rules. The result does not depend on the groups of this machine."""
+    """udev's messages about a file of rules. The result does not depend on the groups of this machine."""
     need("udevadm")
     with tempfile.TemporaryDirectory() as root:
         path = os.path.join(root, "usr/lib/udev/rules.d/60-iwheel.rules")
@@ -336,7 +336,7 @@ class Running(unittest.TestCase):
                 time.sleep(0.05)
             self.assertEqual(gateway.status()["state"], "listening")
         nonzero = [t for t, _, speed in rig.bus.setpoints() if speed != 0]
-        self.assertTrue(nonzero and nonzero[-1] < stopped_us + 600_000, "it went on driving, or never drove")
+        self.assertTrue(nonzero and nonzero[-1] < stopped_us + 600_000, "it continued to drive, or never drove")
         zeros = [t for t, _, speed in rig.bus.setpoints(nonzero[-1]) if speed == 0]
         self.assertGreater(zeros[-1] - nonzero[-1], 1_000_000, "no zeros stopped the wheels, only their own watchdog")
         hold(not rig.bus.setpoints(ended_us), "the new version sent something unasked")
@@ -512,7 +512,7 @@ class Strangers(unittest.TestCase):
         self.rig.start_gateway(wheels=False)
         time.sleep(0.3)
         speeds = {speed for _, _, speed in self.rig.bus.setpoints(killed_us + 20_000)}
-        hold(not any(speeds), f"the wheels are commanded to stand, and nothing else: {speeds}")
+        hold(not any(speeds), f"the wheels are commanded to zero, and nothing else: {speeds}")
         self.assertEqual(speeds, {0})
         self.assertIn(f"process {stranger.child.pid} of user {STRANGER} holds @{names[0]}", self.rig.gateway.text())
         code, text = self.second()

@@ -347,7 +347,7 @@ static void judge_state(oracle_t *self, iw_time_us_t now_us, bool zero, int32_t 
     }
     if (state == IW_STATE_LATCHED && self->state == IW_STATE_LATCHED &&
         (self->latched_silent || (!self->hold_active && zeros_are_over(self, now_us, self->held_us, oracle_us(100))))) {
-        oracle_break(self, now_us, 503, "sent while LATCHED and silent");
+        oracle_break(self, now_us, 503, "sent while LATCHED, after the last zero");
     }
     if (self->hard && zero && limit && current != self->config->max_current_mA) {
         oracle_break(self, now_us, 203, "a stop with a limit of %d mA", current);
@@ -415,13 +415,13 @@ void oracle_sent(oracle_t *self, iw_time_us_t now_us, const iw_can_frame_t *fram
     }
 }
 
-/// Nothing may be sent in silence: after the last zero, the next step purges each setpoint that is not echoed in time.
+/// Nothing may be sent after the last zero: after it, the next step purges each setpoint that is not echoed in time.
 static void judge_silence(oracle_t *self, iw_time_us_t now_us, iw_time_us_t handed_us) {
     const iw_time_us_t given_us = oracle_us(self->config->echo_ms) + oracle_us(self->config->period_ms) + 10U * MS;
     const bool runs = now_us - self->step_us < oracle_us(self->config->period_ms) + 10U * MS &&
                       now_us - self->late_us > given_us && self->received < DRAIN;
     if (self->purges && runs && oracle_elapsed(now_us, self->silent_us, given_us)) {
-        oracle_break(self, now_us, 607, "a setpoint of %llu us ago came out in silence although the port purges",
+        oracle_break(self, now_us, 607, "a setpoint of %llu us ago came out after the last zero although the port purges",
                      (unsigned long long)(now_us - handed_us));
     }
 }

@@ -6,7 +6,7 @@ void oracle_contacts(oracle_t *self, iw_time_us_t now_us, const int reading[2], 
     const bool readable = reading[0] >= 0 && reading[1] >= 0;
     const unsigned pressed = ((reading[0] > 0) ? 1U : 0U) + ((reading[1] > 0) ? 1U : 0U);
     if (result == 0 && (!readable || pressed > 0U)) {
-        oracle_break(self, now_us, 815, "released although a contact says otherwise");
+        oracle_break(self, now_us, 815, "released although a contact is pressed or unreadable");
     }
     if (readable && pressed == 1U) {
         self->apart_us = self->apart ? self->apart_us : now_us;

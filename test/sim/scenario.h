@@ -47,7 +47,7 @@ typedef enum {
     EV_FORCE,       ///< Wheel `who` sends its force in the other unit, or just `a` raw, for `span`.
     EV_LOOP_STALL,  ///< The gateway's process does not run for `span`.
     EV_LOOP_SLOW,   ///< Each wake-up comes up to `a` us late, for `span`.
-    EV_CRASH,       ///< The gateway's process dies and runs again after `span`.
+    EV_CRASH,       ///< The gateway's process is killed and runs again after `span`.
     EV_TIMING,      ///< The port reports for `span` that the bus timing is contradicted.
     EV_GOOD_CLIENT, ///< Client `who` resets, arms, and drives a..b mm/s for `span`, then ends according to `style`.
     EV_BLIND,       ///< Client `who` streams a nonzero command for `span`, whatever the replies.

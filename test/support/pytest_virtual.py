@@ -48,7 +48,7 @@ def pytest_runtest_setup(item):
 
 
 class Boots:
-    """The kernels. `ask` has the interface of Nursery's; `reason` says why there is no kernel, if so."""
+    """The kernels. `ask` has the interface of Nursery's; `reason` is the reason why there is no kernel; None if there is one."""
 
     def __init__(self, config, units):
         sys.path.append(str(KERNEL))

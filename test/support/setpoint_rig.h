@@ -12,7 +12,7 @@ typedef struct {
     iw_time_us_t now_us;
 } setpoint_rig_t;
 
-/// Begins in silence, with the configuration of the fixture and limits of yaw that no ramp reaches.
+/// Begins without setpoints, with the configuration of the fixture and limits of yaw that no ramp reaches.
 void setpoint_rig_init(setpoint_rig_t *self);
 
 /// Begins again with the rig's configuration.
@@ -30,10 +30,10 @@ iw_pair_t setpoint_rig_take_next(setpoint_rig_t *self);
 /// Lets time pass and returns the pair that must be due then.
 iw_pair_t setpoint_rig_take_after(setpoint_rig_t *self, iw_time_us_t for_us);
 
-/// Goes from silence to FOLLOW and reads the first pair.
+/// Goes from SILENCE to FOLLOW and reads the first pair.
 void setpoint_rig_follow(setpoint_rig_t *self);
 
-/// Goes from silence to a speed that has been constant for a long time.
+/// Goes from SILENCE to a speed that has been constant for a long time.
 void setpoint_rig_cruise(setpoint_rig_t *self, int16_t left_mm_s, int16_t right_mm_s, int16_t current_mA);
 
 /// Returns true if the last pair is zero.

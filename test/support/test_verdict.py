@@ -84,7 +84,7 @@ READER_FAULTS = (
         'return 1 if sums[1] else 75 if any(line.startswith("real time") for line in lines) else ended',
         "return 1 if sums[1] else 0",
     ),
-    ("CTest's reader believes the sum of a crashed test", COUNT, "return passed, failed or int(judged), skipped", "return passed, failed, skipped"),
+    ("CTest's reader accepts the sum of a crashed test", COUNT, "return passed, failed or int(judged), skipped", "return passed, failed, skipped"),
 )
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The STM32 port: what it refuses to be built for (test_options.py), its images on an emulated CPU with two wheels on the bus (test_images.py,
+"""The STM32 port: the build options that it refuses (test_options.py), its images on an emulated CPU with two wheels on the bus (test_images.py,
 test_emulate.py), its UART code on QEMU's STM32 (test_uart.py), and the core's unit tests on Cortex-M (test_unit.py). Its driver against a model of the
 bus controller is among the unit tests (CMakeLists.txt). All that is built stays in build/target.
 """
@@ -9,7 +9,7 @@ from images import build_images, missing
 
 
 def pytest_collection_finish(session):
-    """The images, for those that run them."""
+    """The images, for the tests that run them."""
     if not session.config.option.collectonly and not missing() and any(item.path.name in ("test_images.py", "test_faults.py") for item in session.items):
         build_images()
 

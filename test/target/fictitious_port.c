@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Compiles the files of docs/developer/porting.md unchanged, for an invented controller with two transmit slots. The
-// time is virtual. The program ends with 0 if the wheels receive the requested speeds, stand still after the loop was
+// time is virtual. The program ends with 0 if the wheels receive the requested speeds, are at standstill after the loop was
 // held up while the switch stays on, and drive again when the switch was off and is on again. It ends with 1 if they do
 // not receive them in time, and with 3 if they drive again on their own.
 #include "my_port.h"

@@ -25,7 +25,7 @@ def moving(rig, since_ns=0):
 
 
 def assert_stops(rig, since_ns, within_ns, after_ns=SECOND):
-    """The last setpoint that moves is at most that late, and nothing moves for as long as is run then."""
+    """The last nonzero setpoint is at most that late, and nothing moves during the run that follows."""
     rig.run(within_ns + after_ns)
     late = moving(rig, since_ns + within_ns)
     assert not late, f"{late[0].setpoint()} {(late[0].time_ns - since_ns) / MS:.1f} ms after"
@@ -80,7 +80,7 @@ def longest_line(host):
 
 
 def both_words_and_turns(rig):
-    """twist, tare, confirm of nothing, requests that are wrong, and those that a microcontroller has not."""
+    """twist, tare, confirm without an item, invalid requests, and requests that a microcontroller does not have."""
     host = start(rig)
     assert host.ask(1, {"cmd": "nonsense"})["error"] == "unknown_cmd"
     assert host.ask(1, {"cmd": "arm", "speed": 1})["error"] == "unknown_field"
@@ -114,7 +114,7 @@ def both_words_and_turns(rig):
 
 
 def lease_alone(rig):
-    """The client falls silent while its relay goes on: the lease stops the wheels."""
+    """The client sends nothing more while its relay continues: the lease stops the wheels."""
     host = start_driving(rig)
     silent_ns = rig.machine.now_ns
     assert_stops(rig, silent_ns, LEASE_NS + PERIOD_NS + RAMP_NS)
@@ -152,21 +152,21 @@ def relay_killed_and_anew(rig):
     host.say(0, {"cmd": "link"})
     begun_ns = rig.machine.now_ns
     rig.run(PERIOD_NS + RAMP_NS + 30 * MS)
-    assert not moving(rig, begun_ns + PERIOD_NS + RAMP_NS), "the clients of the relay before go on"
+    assert not moving(rig, begun_ns + PERIOD_NS + RAMP_NS), "the clients of the previous relay continue"
     host.open(1)
     host.raw(old)
     assert not host.wait(lambda line: line.message.get("id") == 7).message["ok"]
     assert_stops(rig, begun_ns, PERIOD_NS + RAMP_NS)
     host.arm()
     armed_ns = rig.machine.now_ns
-    host.raw(old.replace(b'"id":7', b'"id":8'))  # Its CRC is wrong now; and as it was:
+    host.raw(old.replace(b'"id":7', b'"id":8'))  # Its CRC is wrong now; then unchanged:
     host.raw(old)
     assert host.wait(lambda line: line.message.get("id") == 7).message["error"] == "stale_command"
     assert not moving(rig, armed_ns)
 
 
 def relay_stopped_goes_on(rig):
-    """The relay is stopped for 0.3 s and goes on with what waited: none of it moves anything, since its stamps are old."""
+    """The relay is stopped for 0.3 s and then sends the lines that waited: none of them moves anything, because their stamps are old."""
     host = start_driving(rig)
     host.fall_silent()
     backlog = [framed(b"1 " + host.quoted(1, {"cmd": "drive", "left_mm_s": 300, "right_mm_s": 300})) + b"\n" for _ in range(15)]
@@ -178,7 +178,7 @@ def relay_stopped_goes_on(rig):
 
 
 def stale_in_every_way(rig):
-    """Wrong start, old and equal number, old stamp, a stamp of the future, none at all: refused, and the lease runs out in spite of them."""
+    """Wrong start, old and equal number, old stamp, a stamp of the future, none at all: refused, and the lease runs out anyway."""
     host = start_driving(rig)
     last_ns, old_us, used = rig.machine.now_ns, host.t_us - 250_000, host.seq[1]
     for turn in range(12):
@@ -216,7 +216,7 @@ def nobody_feeds_another(rig):
 
 
 def estop_random(rig):
-    """The button at any phase of loop, line and bus, with a host that drives and asks: zero within 5 ms, and motion only after reset, arm and a
+    """The button at any phase of loop, line and bus, with a host that drives and sends requests: zero within 5 ms, and motion only after reset, arm and a
     fresh command."""
     host, chance, worst_ns = start_driving(rig), random.Random(21), 0
     host.ask(1, {"cmd": "watch", "topics": ["state", "stop", "estop", "force"], "rate_hz": 100})
@@ -264,7 +264,7 @@ FLOODS = {
     "twist": lambda host, channel: host.quoted(channel, {"cmd": "twist", "v_mm_s": SPEED, "yaw_mrad_s": 0}),
     "stop": {"cmd": "stop"},
     "disarm": {"cmd": "disarm"},
-    "estop": {"cmd": "estop", "reason": "a reason that is as long as an operator in a hurry may write it"},
+    "estop": {"cmd": "estop", "reason": "a reason that is as long as an operator may write it"},
     "release": {"cmd": "release"},
     "tare": {"cmd": "tare"},
     "confirm": {"cmd": "confirm", "item": "wheel_radius", "value": "192"},
@@ -327,7 +327,7 @@ def estop_in_floods(rig):
 
 
 def software_estop(rig):
-    """estop needs no lease; its reason comes back; reset and arm do not move."""
+    """estop needs no lease; its reason is reported; reset and arm do not move the wheels."""
     host = start_driving(rig)
     host.open(2, watch=True)
     assert host.ask(2, {"cmd": "estop", "reason": "test of it"})["state"] == "latched"
@@ -344,14 +344,14 @@ def software_estop(rig):
 
 
 def reset_in_motion(rig):
-    """Both resets while the wheels turn: zeros first, another boot, and commands of before feed nothing."""
+    """Both resets while the wheels turn: zeros first, another boot, and earlier commands do not extend the lease."""
     host = start_driving(rig)
     boots = {host.boot}
     for reset in (lambda: rig.machine.reset("pin", PINRSTF), rig.machine.divert):
         reset()
         reset_ns = rig.machine.now_ns
         old = host.boot
-        for _ in range(20):  # The relay goes on as if nothing had happened.
+        for _ in range(20):  # The relay continues as before.
             host.drive(SPEED, wait=False, boot=old)
             rig.run(20 * MS)
         if len(boots) == 1:
@@ -439,7 +439,7 @@ def power_cut_while_writing(rig):
         rig.machine.flash.cut_after = cut
         host.say(1, {"cmd": "config", "commit": True})
         rig.run(100 * MS)
-        if rig.machine.flash.cut_after is not None:  # The commit was through before.
+        if rig.machine.flash.cut_after is not None:  # The commit was complete before.
             rig.machine.flash.cut_after, rig.machine.flash.next_cut = None, cut // 2  # And now the counting of the next power-on.
             rig.machine.lose_power()
         host.begin_again()
@@ -481,10 +481,10 @@ def stored_in_flash(rig):
         assert flash.operations == before, "written while something can move"
         rig.run(20 * MS)
     rig.run(1900 * MS)
-    assert flash.operations == before, "written before two seconds of silence have passed"
+    assert flash.operations == before, "written before two seconds without setpoints have passed"
     rig.run(300 * MS)
     assert flash.operations > before, "not written"
-    rig.run(2 * SECOND)  # A tare wants two quiet seconds.
+    rig.run(2 * SECOND)  # A tare needs two seconds at standstill.
     tared = host.ask(1, {"cmd": "tare", "side": "left"})["left"]["offset_mN"]
     rig.run(20 * MS)
     reported = host.events("offset")
@@ -593,7 +593,7 @@ def bus_off_driven(rig):
 
 
 def damaged(chance, line):
-    """One of the ways in which a line comes that was not sent like that."""
+    """One of the ways in which a line arrives changed."""
     data, way = bytearray(line), chance.randrange(6)
     at = chance.randrange(len(data) - 1)
     if way == 0:
@@ -650,7 +650,7 @@ def hostile_line(rig):
 
 
 def noise_on_the_wire(rig):
-    """Bytes that the chip itself saw to be damaged, and a flood of rubbish: the e-stop still works in time."""
+    """Bytes that the chip itself detects as damaged, and a flood of random bytes: the e-stop still works in time."""
     host = start_driving(rig)
     for _ in range(30):
         rig.machine.uart.disturb()
@@ -721,7 +721,7 @@ def crowd(rig):
         rig.run(20 * MS)
         host.listen()
     frames = rig.setpoints(begun_ns + 200 * MS)
-    assert frames and all(frame.setpoint()[0] == SPEED for frame in frames), "the crowd disturbed the driver"
+    assert frames and all(frame.setpoint()[0] == SPEED for frame in frames), "the eight clients disturbed the driver"
     times = [frame.time_ns for frame in frames if frame.id == LEFT]
     gap_ns = max(b - a for a, b in itertools.pairwise(times))
     assert gap_ns < 30 * MS, f"a gap of {gap_ns / MS:.1f} ms"

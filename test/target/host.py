@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The host's end of the serial line, for the scenarios of the image `gateway`: a relay that sends the given lines, right or wrong."""
+"""The host's end of the serial line, for the scenarios of the image `gateway`: a relay that sends the given lines, valid or not."""
 
 import json
 import zlib
@@ -19,7 +19,7 @@ def compact(message):
 
 
 class Line:
-    """One that the board wrote."""
+    """A line that the board wrote."""
 
     def __init__(self, text):
         body, star, crc = text.rpartition(b"*")
@@ -29,7 +29,7 @@ class Line:
 
 
 class Host:
-    """`rig` runs on while an answer is awaited. `lines` holds all that the board said; channel 0 is the relay's own."""
+    """`rig` continues to run while a reply is awaited. `lines` contains all lines of the board; channel 0 is the relay's own."""
 
     def __init__(self, rig, alive=True):
         self.rig, self.machine, self.uart = rig, rig.machine, rig.machine.uart
@@ -56,12 +56,12 @@ class Host:
         self.uart.send(line)
 
     def say(self, channel, message):
-        """One good line."""
+        """Sends one valid line."""
         body = message if isinstance(message, bytes) else compact(message)
         self.raw(framed(b"%d " % channel + body) + b"\n")
 
     def listen(self):
-        """What the board has said since the last call."""
+        """The lines of the board since the last call."""
         new, self.rest = self.rest + bytes(self.uart.sent), b""
         self.uart.sent.clear()
         *texts, self.rest = new.split(b"\n")
@@ -105,7 +105,7 @@ class Host:
         return self.open(channel)
 
     def begin_again(self, channel=1):
-        """After a start of the board: what was cut is forgotten, and nothing of before counts."""
+        """After a start of the board: drops a line that was cut, and everything received before."""
         self.rest = b""
         self.uart.sent.clear()
         self.uart.typed.clear()
@@ -134,7 +134,7 @@ class Host:
         return reply
 
     def keep_driving(self, speed_mm_s, span_ms, channel=1, period_ms=20):
-        """Drives for so long, without waiting for the answers."""
+        """Drives for that time, without waiting for the replies."""
         for _ in range(span_ms // period_ms):
             self.drive(speed_mm_s, channel, wait=False)
             self.rig.run(period_ms * MS)

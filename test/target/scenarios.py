@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""What the image must do, whatever happens around it. Each scenario is a function of a `Rig`; an AssertionError is a failure.
+"""The required behaviour of the image in all situations. Each scenario is a function of a `Rig`; an AssertionError is a failure.
 
-Verdicts are passed on the bus, the lamp and the count of resets: on what can be seen from outside.
+The bus, the lamp and the count of resets are judged: everything that is visible from outside.
 """
 
 import itertools
@@ -22,7 +22,7 @@ ARMED, ESTOP, LATCHED = "steady", "1 flashes, 50 % lit", "2 flashes, 50 % lit"
 
 def assert_zero(frames):
     for frame in frames:
-        assert frame.setpoint() == ZERO, f"{frame.id} says {frame.setpoint()} at {frame.time_ns / MS:.3f} ms"
+        assert frame.setpoint() == ZERO, f"{frame.id} has {frame.setpoint()} at {frame.time_ns / MS:.3f} ms"
 
 
 def assert_pairs(frames):
@@ -60,11 +60,11 @@ def arm(rig, within_ns=SECOND):
 
 
 def assert_held_then_silent(rig, since_ns, hold_ns=1475 * MS):
-    """Zeros for the hold, then nothing for as long as was run."""
+    """Zeros for the hold, then nothing until the end of the run."""
     frames = rig.setpoints(since_ns)
     assert_zero(frames)
     assert frames and frames[-1].time_ns - since_ns >= hold_ns, "the zeros were not held"
-    assert rig.machine.now_ns - frames[-1].time_ns > 300 * MS, "no silence after the hold"
+    assert rig.machine.now_ns - frames[-1].time_ns > 300 * MS, "setpoints after the hold"
 
 
 def open_estop(rig):
@@ -118,7 +118,7 @@ def listening(rig):
     """Without setpoint type and role, the board receives everything, sends nothing and acknowledges nothing."""
     rig.run(2 * SECOND)
     assert not rig.setpoints() and rig.machine.bus.attempts == 0
-    assert rig.machine.can.is_silent(), "the controller is not silent"
+    assert rig.machine.can.is_silent(), "the controller is not in silent mode"
     assert rig.machine.can.timing() == (1_000_000, 625)
     assert rig.counter("received") > 1000, f"only {rig.counter('received')} frames received"
     assert_lamp(rig, LISTENING)
@@ -195,7 +195,7 @@ def time_never_goes_back(rig):
 
 
 def estop(rig):
-    """Pressed while armed: a zero within 5 ms, held, then silence, also after the release."""
+    """Pressed while armed: a zero within 5 ms, held, then no setpoints, also after the release."""
     arm(rig)
     rig.run(7_300 * US)
     pressed_ns = rig.machine.now_ns
@@ -212,7 +212,7 @@ def estop(rig):
 
 
 def estop_pulse(rig):
-    """Open for 1 us, over before anybody can read the level: latched."""
+    """Open for 1 us, which is too short to read the level: latched."""
     arm(rig)
     pressed_ns = rig.machine.now_ns
     open_estop(rig)
@@ -336,7 +336,7 @@ def wheel_missing(rig):
 
 
 def wheel_lost(rig):
-    """A wheel without power while armed: zeros for at most a minute, then silence, and no arming when it comes back."""
+    """A wheel without power while armed: zeros for at most a minute, then no setpoints, and no arming when it returns."""
     arm(rig)
     lost_ns = rig.machine.now_ns
     rig.machine.bus.wheels[0].power(False, lost_ns)
@@ -348,7 +348,7 @@ def wheel_lost(rig):
 
 
 def no_acknowledgement(rig):
-    """Nobody acknowledges: not armed, not bus-off, no hang. With acknowledgements at most the pair that was just asked for leaves, and it
+    """No node acknowledges: not armed, not bus-off, no hang. With acknowledgements at most the pair that was just asked for leaves, and it
     arms."""
     rig.machine.bus.acknowledge_chip = False
     rig.run(500 * MS)
@@ -366,7 +366,7 @@ def no_acknowledgement(rig):
 
 
 def acknowledgement_lost(rig):
-    """In motion nobody acknowledges for 300 ms: latched, and what was waiting then never comes."""
+    """In motion no node acknowledges for 300 ms: latched, and frames that waited then are never sent."""
     start_demo(rig)
     rig.machine.bus.acknowledge_chip = False
     lost_ns = rig.machine.now_ns
@@ -379,7 +379,7 @@ def acknowledgement_lost(rig):
 
 
 def silence_is_silent(rig):
-    """In motion nobody acknowledges, and after the hold the wheels lose power: nothing is tried any more, and nothing leaves when they get it back
+    """In motion no node acknowledges, and after the hold the wheels lose power: nothing more is sent, also not when the power returns
     after 20 s. Reset, arming and a new press are needed."""
     start_demo(rig)
     bus = rig.machine.bus
@@ -389,7 +389,7 @@ def silence_is_silent(rig):
     for wheel in bus.wheels:
         wheel.power(False, rig.machine.now_ns)
     rig.run(15 * SECOND)
-    assert bus.attempts == attempts, f"{bus.attempts - attempts} attempts in silence"
+    assert bus.attempts == attempts, f"{bus.attempts - attempts} attempts after the last zero"
     bus.acknowledge_chip = True
     back_ns = rig.machine.now_ns
     for wheel in bus.wheels:
@@ -404,7 +404,7 @@ def silence_is_silent(rig):
 
 
 def abort_without_end(rig):
-    """In motion nobody acknowledges, and the controller does not end the abort: it is reset, and nothing old comes."""
+    """In motion no node acknowledges, and the controller does not end the abort: it is reset, and no old frame is sent."""
     start_demo(rig)
     rig.machine.can.slow_aborts(0xFFFFFFFF)
     rig.machine.bus.acknowledge_chip = False
@@ -510,7 +510,7 @@ def stuck_in_motion(rig):
 
 
 def full_bus(rig):
-    """Somebody fills the bus with short frames of an accepted id: none is lost, and setpoints go on leaving."""
+    """Another node fills the bus with short frames of an accepted id: none is lost, and setpoints are still sent."""
     arm(rig)
     bus, start_ns, flooded = rig.machine.bus, rig.machine.now_ns, rig.machine.bus.flooded
     before = rig.counter("bad_format")
@@ -547,7 +547,7 @@ def overrun(rig):
 
 
 def babbling(rig):
-    """Somebody fills the bus with an id below ours: latched, since nothing leaves; zeros once it stops."""
+    """Another node fills the bus with an id below the setpoints': latched, because nothing is sent; zeros after it stops."""
     start_demo(rig)
     since_ns = rig.machine.now_ns
     rig.machine.bus.flood = Frame(1, bytes(8), sender="flood")
@@ -559,7 +559,7 @@ def babbling(rig):
 
 
 def second_master(rig):
-    """Somebody else's setpoint: latched."""
+    """A setpoint of another node: latched."""
     arm(rig)
     rig.machine.bus.extra.append(Frame(RIGHT, bytes([1, 0, 0, 0, 0]), sender="master"))
     since_ns = rig.machine.now_ns
@@ -609,7 +609,7 @@ def hang(rig):
     rig.machine.frozen = True
     rig.run(300 * MS)
     rig.expect_resets("watchdog")
-    assert rig.machine.resets, "the watchdog did not bite"
+    assert rig.machine.resets, "the watchdog did not reset the chip"
     assert rig.machine.resets[0][0] - hung_ns < 200 * MS, "the watchdog took too long"
     rig.run(3 * SECOND)
     reset_ns = rig.machine.resets[0][0]
@@ -709,13 +709,13 @@ def boot_loader(rig):
 
 
 def loop_stuck(rig):
-    """In motion the main loop goes round on one spot while interrupts are served as ever: the watchdog bites."""
+    """In motion the main loop repeats one statement for ever while interrupts are still served: the watchdog resets the chip."""
     start_demo(rig)
     stuck_ns = rig.machine.now_ns
     rig.machine.divert()
     rig.run(300 * MS)
     rig.expect_resets("watchdog")
-    assert rig.machine.resets and rig.machine.resets[0][0] - stuck_ns < 200 * MS, "the watchdog did not bite"
+    assert rig.machine.resets and rig.machine.resets[0][0] - stuck_ns < 200 * MS, "the watchdog did not reset the chip"
     rig.run(2 * SECOND)
     reset_ns = rig.machine.resets[0][0]
     assert rig.setpoints(reset_ns)[0].time_ns - reset_ns < 300 * MS, "no zeros first"
@@ -735,7 +735,7 @@ def stuck_while_listening(rig):
 
 
 def demo_button_held_through_reset(rig):
-    """The button that started the profile stays down while the watchdog bites: no motion until it is let go and pressed again."""
+    """The button that started the profile stays pressed while the watchdog resets the chip: no motion until it is released and pressed again."""
     arm(rig)
     rig.machine.board.drive("button", 0)
     rig.run(600 * MS)
@@ -777,7 +777,7 @@ def demo_second_press_stops(rig):
 
 
 def demo_button_held(rig):
-    """The button is down when power comes: no motion before it was let go and pressed again. Held, it repeats nothing."""
+    """The button is down when power comes: no motion before it is released and pressed again. While held, it repeats nothing."""
     rig.machine.board.drive("button", 0)
     arm(rig, 1500 * MS)
     rig.machine.board.drive("button", None)
@@ -883,7 +883,7 @@ BY_BOARD = {
     "stm32g474": {**SCENARIOS, "crystal": (other_crystal,)},
     "stm32f446": {"zero": (nominal, console), "clock": (clock_input,), "demo": (crystal_dies,), "gateway": (gateway_scenarios.talks,)},
 }
-# Long, and what they ask does not depend on the chip's family: on the second board only in ./check --full.
+# Long, and independent of the chip's family: on the second board only in ./check --full.
 LONG = (
     wheel_lost,
     estop_chatters,

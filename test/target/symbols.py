@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Where a field of a structure is in the image's RAM, asked of the compiler and of the linker."""
+"""Where a field of a structure is in the image's RAM, from the compiler and the linker."""
 
 import functools
 import re

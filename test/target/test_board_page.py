@@ -2,7 +2,7 @@
 """The tables of pins in docs/user/stm32.md and board.md, and the addresses and names of the commands that flash, are those of the boards. The table of
 the LED is that of lamp.h.
 
-The pins are asked of the compiler (boards/BOARD/board.h, board_pins.h), the address of memory.ld. A row that is not true is printed as it must be.
+The compiler returns the pins (boards/BOARD/board.h, board_pins.h), the address of memory.ld. A wrong row is printed in its correct form.
 """
 
 import re

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What app/demo/emulate shows to who has no board: the first line, the wheels, the e-stop; and the serial port in both directions."""
+"""The output of app/demo/emulate, which needs no board: the first line, the wheels, the e-stop; and the serial port in both directions."""
 
 import functools
 import os

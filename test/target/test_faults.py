@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The seeded faults that only a running image shows (test/faults) are noticed."""
+"""The tests detect the seeded faults that only a running image shows (test/faults)."""
 
 import re
 import sys

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The images of the four boards on an emulated Cortex-M: scenarios.py, gateway_scenarios.py. What is long and the same on all families runs on the first
+"""The images of the four boards on an emulated Cortex-M: scenarios.py, gateway_scenarios.py. Long scenarios that are the same on all families run on the first
 board only, unless IWHEEL_FULL is 1. It also checks the files next to each image, which flashing tools need.
 """
 
@@ -20,7 +20,7 @@ pytestmark = [pytest.mark.exact, pytest.mark.limit(3000)]
 
 
 def cases():
-    """Those that begin alike are together, the largest group is first."""
+    """Scenarios with the same beginning are together, the largest group is first."""
     groups = {}
     for board, images in scenarios.BY_BOARD.items():
         for image, several in images.items():
@@ -35,7 +35,7 @@ def cases():
 
 @functools.cache
 def begun(board, image, oscillator, beginning):
-    """The rig after what several scenarios begin with."""
+    """The rig after the common beginning of several scenarios."""
     emulate.load(WORK / "libmodel.so")
     gc.disable()  # Garbage collection costs a twentieth of the time, and finds little before the end.
     rig = emulate.Rig(WORK / f"images/{board}-{image}.elf", oscillator)

@@ -25,7 +25,7 @@ CRYSTALS_THAT_CANNOT = {
     "stm32f446": (2, 32),
     "stm32g474": (2, 6, 9, 26, 52),
 }
-REFUSALS = {  # Options, and what the message must say.
+REFUSALS = {  # Options, and the text that the message must contain.
     "-DIWHEEL_SETPOINT_TYPE=256 -DIWHEEL_CURRENT_ROLE=limit": "number from 0 to 255",
     "-DIWHEEL_SETPOINT_TYPE=one -DIWHEEL_CURRENT_ROLE=limit": "number from 0 to 255",
     "-DIWHEEL_SETPOINT_TYPE=1 -DIWHEEL_CURRENT_ROLE=torque": "must be limit or setpoint",
@@ -72,7 +72,7 @@ def test_bus_clock_does_not_compile_and_the_message_helps(mhz, tmp_path):
 
 
 def check_source(board, source, *options):
-    """Compiles a file of the board and throws the result away."""
+    """Compiles a file of the board without keeping the result."""
     flags = [f"-mcpu={CPUS[board]}", "-mthumb", "-std=c11", "-fsyntax-only", *options]
     folders = [ROOT / "core/include", STM32, STM32 / "access", STM32 / "boards" / board]
     return run(["arm-none-eabi-gcc", *flags, *(f"-I{folder}" for folder in folders), STM32 / source])
@@ -117,7 +117,7 @@ def test_refused(options, tmp_path):
 
 @pytest.fixture
 def port(tmp_path):
-    """Made by somebody who has read docs/developer/porting.md only, for a controller that exists nowhere: how its files are compiled."""
+    """The compilation of a port for a fictitious controller, whose author has read only docs/developer/porting.md."""
     for name, text in PAGE:
         (tmp_path / (name or "without_a_name.c")).write_text(text)
     return ["gcc", "-Wall", "-Wextra", "-Wpedantic", "-Wmissing-prototypes", "-Werror", f"-I{ROOT / 'core/include'}", f"-I{tmp_path}"]

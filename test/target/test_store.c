@@ -131,7 +131,7 @@ TEST(test_store_cut_at_any_instant_leaves_the_old_or_new_record) {
             power_up();
             const uint32_t after = newest(&store);
             TEST_ASSERT_TRUE_MESSAGE(after == before || after == number, "neither the old nor the new one");
-            TEST_ASSERT_TRUE_MESSAGE(!done || after == number, "it was said to be written and is not");
+            TEST_ASSERT_TRUE_MESSAGE(!done || after == number, "it was reported as written and is not");
         }
         TEST_ASSERT_TRUE_MESSAGE(write(&store, number + 1U, true), "cuts left no way to go on");
     }

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The image's UART code on QEMU's STM32F405, whose USART2 is on a pseudo terminal: arm/uart.c says what of it.
+"""The image's UART code on QEMU's STM32F405, whose USART2 is on a pseudo terminal: arm/uart.c lists the tested parts.
 
 Proves, on a model of the chip that is not ours: base and offsets of the registers, the bits that switch transmitter and receiver on, status
 flags and data register in both directions, and the order in which serial.c sends what is written and what is lent. Does not: the DMA's
@@ -37,7 +37,7 @@ class Line:
         os.write(self.terminal, text)
 
     def receive(self, wanted):
-        """True once exactly that has been said next; false when something else is said, or the machine is gone."""
+        """True if exactly this text arrives next; false if another text arrives, or the machine has ended."""
         end = time.monotonic() + PATIENCE_S
         while len(self.heard) < len(wanted) and time.monotonic() < end:
             if select.select([self.terminal], [], [], 0.1)[0]:

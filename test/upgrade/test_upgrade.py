@@ -255,7 +255,7 @@ def change_in_motion(machine, bus, packages, version, way):
 
 
 def killed_in_motion(machine, bus, packages, way):
-    """A gateway dies while it drives, and the packages are changed before it is started again."""
+    """A gateway is killed while it drives, and the packages are changed before it is started again."""
     driver = drive(machine, bus)
     os.kill(machine.pid(), signal.SIGKILL)
     driver.wait(60)

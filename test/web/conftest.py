@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The web bridge on simulated wheels: what it answers, to whom, what it costs the gateway (test_bridge.py), and its page in two real browsers.
+"""The web bridge on simulated wheels: its replies, the rights of its clients, its cost for the gateway (test_bridge.py), and its page in two real browsers.
 
 The browsers are Debian's chromium by PyPI's playwright (test_browser.py, test_first_screen.py), and Debian's firefox-esr by WebDriver BiDi
 (test_firefox.py); the judge of accessibility axe-core (scripts/web_assets --test). What is missing is skipped, and

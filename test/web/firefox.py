@@ -16,7 +16,7 @@ from pathlib import Path
 from trials import Skip, until
 
 ASSETS = Path(os.environ.get("IWHEEL_WEB_ASSETS") or Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "iwheel/web")
-# No first-run pages, no look for updates, no request to any other machine.
+# No first-run pages, no search for updates, no request to any other machine.
 PREFERENCES = {
     "app.update.enabled": False,
     "browser.aboutwelcome.enabled": False,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The bridge without a browser: who is let in, what hostile peers get, what reaches the gateway and the bus."""
+"""The bridge without a browser: access rights, hostile peers, and the requests that reach the gateway and the bus."""
 
 import contextlib
 import gzip
@@ -34,7 +34,7 @@ COMMANDS = ("/api/stop", *PROVED)
 
 
 def raw(rig, data, seconds=3):
-    """What comes back for these bytes, until the bridge closes or says nothing more."""
+    """The reply to these bytes, until the bridge closes the connection or sends nothing more."""
     with socket.create_connection(("127.0.0.1", rig.port), timeout=seconds) as one:
         answer = b""
         try:
@@ -55,7 +55,7 @@ def gateway_state(rig):
         client.close()
 
 
-# ---- who is let in --------------------------------------------------------------------------------------------------
+# ---- access ---------------------------------------------------------------------------------------------------------
 
 
 def test_token_missing_or_wrong_reveals_and_stops_nothing(rig):
@@ -85,7 +85,7 @@ def test_stop_never_needs_a_proof(rig):
         assert status == 200 and body["state"] == "stopping", body
         assert (late := braking_ms(rig, since)) < 200, f"{late} ms"
         driver.end()
-        until(lambda: gateway_state(rig)["state"] == "listening", what="the wheels stand")
+        until(lambda: gateway_state(rig)["state"] == "listening", what="the wheels are at standstill")
 
 
 @pytest.mark.rig(driving=True)
@@ -281,7 +281,7 @@ def test_header_that_counts_is_there_once(rig):
 # ---- hostile peers ---------------------------------------------------------------------------------------------------
 
 
-# As many connections as it can have, made anew as they are closed. Every second one asks for the page without end, too.
+# As many connections as it can have, replaced as they are closed. Every second one also requests the page without end.
 FLOOD = """
 import select, socket, sys
 def knock(number):
@@ -332,9 +332,9 @@ def test_stop_during_1000_connections_arrives_without_a_gap(rig):
         for _ in range(20):
             begun = time.monotonic()
             assert rig.ask("GET", "/health")[0] == 200
-            assert time.monotonic() - begun < 0.5, "who has the token waits"
+            assert time.monotonic() - begun < 0.5, "a client with the token waits"
             time.sleep(0.05)
-        assert int(crowd.search(rig.ask("GET", "/metrics")[1])[1]) > before + 1000, "the flood has ended by itself"
+        assert int(crowd.search(rig.ask("GET", "/metrics")[1])[1]) > before + 1000, "the flood has ended on its own"
         assert_no_gap(rig, since)
         assert gateway_state(rig)["state"] == "armed", gateway_state(rig)["cause"]
         pressed = now_us()
@@ -365,7 +365,7 @@ def test_slow_connections_and_bombs_cost_the_gateway_no_gap(rig):
     assert rig.ask("GET", "/health")[0] == 200
     slow = [socket.create_connection(("127.0.0.1", rig.port)) for _ in range(20)]
     begun = time.monotonic()
-    while time.monotonic() - begun < 6.5:  # A byte now and then is no request.
+    while time.monotonic() - begun < 6.5:  # Single bytes with pauses are no request.
         for one in slow:
             with contextlib.suppress(OSError):
                 one.send(b"G" if one is slow[0] else b"X")
@@ -396,7 +396,7 @@ def test_watchers_leave_room_for_stop(rig):
     assert told == [b"200"] * 5 + [b"503"] * 2, told
     idle = [socket.create_connection(("127.0.0.1", rig.port)) for _ in range(8)]
     assert rig.ask("POST", "/api/estop")[0] == 200
-    until(lambda: b"latched" in streams[0].recv(65536), what="who watched goes on watching")
+    until(lambda: b"latched" in streams[0].recv(65536), what="earlier watchers continue to watch")
     for one in streams + idle:
         one.close()
 
@@ -423,7 +423,7 @@ def test_64_watchers_are_one_gateway_client_and_all_get_events(rig):
     finally:
         for stream in streams:
             stream.close()
-    until(lambda: "iwheel_web_watchers 0\n" in rig.ask("GET", "/metrics")[1], what="their streams are let go")
+    until(lambda: "iwheel_web_watchers 0\n" in rig.ask("GET", "/metrics")[1], what="their streams are closed")
 
 
 # ---- stopping and driving ---------------------------------------------------------------------------------------------
@@ -437,16 +437,16 @@ def test_stop_is_on_the_bus_within_a_fifth_of_a_second(rig):
     assert status == 200 and body["state"] == "stopping", body
     assert (late := braking_ms(rig, since)) < 200, f"{late} ms"
     driver.end()
-    until(lambda: gateway_state(rig)["state"] == "listening", what="the wheels stand")
+    until(lambda: gateway_state(rig)["state"] == "listening", what="the wheels are at standstill")
     assert rig.ask_json("POST", "/api/estop")[1]["state"] == "latched"
-    stops = until(lambda: (found := rig.ask_json("GET", "/api/stops")[1]["stops"]) and len(found) == 2 and found, 8, "both stops are told")
+    stops = until(lambda: (found := rig.ask_json("GET", "/api/stops")[1]["stops"]) and len(found) == 2 and found, 8, "both stops are reported")
     assert [stop["cause"] for stop in stops] == ["estop_software", "client_stop"] and len(stops[1]["frames_before"]) == 40
 
 
 def test_gateway_killed_is_said_and_found_again(rig):
     rig.start().connected()
     rig.kill_gateway(signal.SIGKILL)
-    until(lambda: rig.ask("GET", "/health")[0] == 503, 3, "health tells it")
+    until(lambda: rig.ask("GET", "/health")[0] == 503, 3, "health reports it")
     status, body = rig.ask_json("POST", "/api/stop")
     assert status == 503 and body["message"].startswith("NOT DELIVERED"), body
     assert "iwheel_up 0\n" in rig.ask("GET", "/metrics")[1]
@@ -501,7 +501,7 @@ def test_page_drives_while_it_asks_and_no_longer(rig):
         status, body = person.drive(key, sequence, age_us, v)
         assert status == 409 and body["error"] == "dropped", body
     since = now_us()
-    until(lambda: gateway_state(rig)["state"] in ("stopping", "listening"), 3, "silence stops the wheels")
+    until(lambda: gateway_state(rig)["state"] in ("stopping", "listening"), 3, "the wheels stop without commands")
     assert braking_ms(rig, since) < 1000
     assert person.drive(terms["key"], number + 9, v=0)[1]["ok"] is False
     until(lambda: rig.ask("GET", "/metrics")[1].count("iwheel_web_dropped_commands_total") == 1)
@@ -535,7 +535,7 @@ def test_driving_by_the_watch_socket_ends_with_the_missing_right(rig):
 # ---- a stop is never refused and never queues -------------------------------------------------------------------------
 
 
-# Each of so many connections asks again as soon as it has its answer. The seconds between are too short for anything else.
+# Each connection sends its next request as soon as it has the reply. The seconds between are too short for anything else.
 POLL = """
 import http.client, sys, threading
 port, count, secret = int(sys.argv[1]), int(sys.argv[2]), sys.argv[3]
@@ -566,7 +566,7 @@ def polling(rig, count, *paths):
 
 
 def stop_ms(rig, verb="stop"):
-    """Milliseconds from the request to the first smaller setpoint on the bus, beside a client that drives."""
+    """Milliseconds from the request to the first smaller setpoint on the bus, next to a client that drives."""
     driver = Driver(rig)
     since = now_us()
     status, body = rig.ask_json("POST", f"/api/{verb}")
@@ -581,7 +581,7 @@ def assert_stops(rig, times=4):
         late = stop_ms(rig)
         print(f"        {late:.0f} ms", flush=True)
         assert late < 200, f"{late} ms"
-        until(lambda: gateway_state(rig)["state"] == "listening", what="the wheels stand")
+        until(lambda: gateway_state(rig)["state"] == "listening", what="the wheels are at standstill")
 
 
 def test_stop_never_waits_for_viewers_who_poll(rig):
@@ -597,7 +597,7 @@ def test_stop_never_waits_for_questions_of_viewers(rig):
 
 
 def test_stop_never_needs_a_free_place_of_the_bridge(rig):
-    """Every place of the bridge is taken: by streams, by pollers, by connections that ask nothing."""
+    """Every place of the bridge is taken: by streams, by pollers, by connections without a request."""
     rig.start().connected()
     streams = [rig.stream() for _ in range(80)]
     idle = [socket.create_connection(("127.0.0.1", rig.port)) for _ in range(200)]
@@ -661,7 +661,7 @@ def test_one_person_drives_and_the_second_is_busy_by_name(rig):
     sequence = drive_for(first, key, sequence, 0.1)
     assert gateway_state(rig)["lease"]["name"] == name and gateway_state(rig)["state"] == "armed"
     assert first.ask("POST", "/api/stop")[0] == 200
-    until(lambda: gateway_state(rig)["state"] == "listening", what="the wheels stand")
+    until(lambda: gateway_state(rig)["state"] == "listening", what="the wheels are at standstill")
     time.sleep(0.6)
     status, terms = second.arm()
     assert status == 200 and terms["key"] != key, terms
@@ -739,7 +739,7 @@ def test_arm_and_reset_too_old_or_of_another_stop_are_stale(rig):
 
 
 class Forwarder(threading.Thread):
-    """Holds the bytes of each connection back for so long, towards the bridge only."""
+    """Delays the bytes of each connection by that time, towards the bridge only."""
 
     def __init__(self, rig):
         super().__init__(daemon=True)
@@ -803,7 +803,7 @@ def test_reset_held_back_opens_no_latch_that_was_set_meanwhile(rig):
         else:
             assert gateway_state(rig)["state"] == "latched"
             assert [answer for answer in answers if answer[1]["error"] != "stale_command"] == []
-    # In time, but for the stop before: somebody reset at the machine and pressed once more.
+    # In time, but for the previous stop: a person at the machine has reset it and pressed again.
     forwarder.delay_s = 0.6
     claim = reset_of(person, number)
     with ThreadPoolExecutor(1) as pool:
@@ -815,7 +815,7 @@ def test_reset_held_back_opens_no_latch_that_was_set_meanwhile(rig):
     assert gateway_state(rig)["state"] == "latched"
 
 
-# ---- who answers on loopback -------------------------------------------------------------------------------------------
+# ---- other programs on loopback -----------------------------------------------------------------------------------------
 
 
 def test_start_without_both_loopback_addresses_is_refused(rig):
@@ -882,7 +882,7 @@ def test_port_of_systemd_stays_ours_while_the_bridge_restarts(rig):
         waits = stack.enter_context(socket.create_connection(("127.0.0.1", rig.port), timeout=10))
         waits.sendall(b"POST /api/stop HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n\r\n")
         start_with(rig, sockets)
-        assert waits.recv(100).startswith(b"HTTP/1.1 "), "who came meanwhile is answered by the next one"
+        assert waits.recv(100).startswith(b"HTTP/1.1 "), "the next bridge answers the connections made meanwhile"
 
 
 def test_sockets_of_systemd_that_listen_elsewhere_are_refused(rig):
@@ -956,7 +956,7 @@ def test_tls_needs_a_trusted_certificate_and_its_key(rig):
     until(answers, what="TLS answers")
     try:
         answer("other")
-        raise AssertionError("a wrong certificate was taken")
+        raise AssertionError("a wrong certificate was accepted")
     except ssl.SSLCertVerificationError:
         pass
 
@@ -1070,7 +1070,7 @@ def test_unix_socket_deletes_no_file_and_no_link(rig):
     with socket.socket(socket.AF_UNIX) as dead:
         dead.bind(str(place))
     web = rig.start_web(wait=False)
-    until(lambda: "its address with the token" in web.text(), what="a socket that is left over makes room")
+    until(lambda: "its address with the token" in web.text(), what="a leftover socket is replaced")
 
 
 def test_unix_socket_in_place_of_a_port(rig):
@@ -1114,7 +1114,7 @@ def test_metrics_are_those_of_the_snapshot_and_well_formed(rig):
             seen.add((found[1], found[2]))
     for side in ("left", "right"):
         assert f'iwheel_wheel_battery_volts{{side="{side}"}} {state[side]["battery_dV"] / 10:.1f}' in lines
-        assert not any(line.startswith(f'iwheel_wheel_applied_meters_per_second{{side="{side}"') for line in lines), "nothing is told in silence"
+        assert not any(line.startswith(f'iwheel_wheel_applied_meters_per_second{{side="{side}"') for line in lines), "no value without telemetry"
     assert f'iwheel_state{{iwheel_state="{state["state"]}"}} 1' in lines
 
 
@@ -1162,7 +1162,7 @@ scrape_configs:
 
 @contextlib.contextmanager
 def prometheus(rig):
-    """One that scrapes the bridge by the shipped rules: asked by a path, it gives the data of its answer."""
+    """A Prometheus that scrapes the bridge with the shipped rules; called with a path, returns the data of its reply."""
     if not shutil.which("prometheus"):
         raise Skip("prometheus is missing (scripts/install_tools check brings it)")
     port = free_port()
@@ -1213,7 +1213,7 @@ def test_prometheus_takes_the_figures_and_alerts_of_an_estop(rig):
 
 
 def test_words_of_the_page_are_those_of_iwheelctl(rig):
-    """The cures of causes, and what to do next, stand once more in strings.en.js: letter for letter."""
+    """strings.en.js repeats the fixes of causes and the next actions: its texts must be identical."""
     advice = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "app/ctl").rglob("advice.c"))
     strings = (ROOT / "app/bridge/web/page/strings.en.js").read_text(encoding="utf-8")
     cures = dict(re.findall(r'\{"(\w+)", "([^"]+)"\}', advice))

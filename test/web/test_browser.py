@@ -47,7 +47,7 @@ def page_of(rig, size="desk", scheme="light", url=None, **device):
 
 
 def seen(page, condition):
-    """The page's policy lets nobody evaluate texts, so it is asked from outside until it is so."""
+    """Evaluates the condition from outside until it is true, because the page's policy forbids evaluating texts."""
     return until(lambda: page.evaluate(condition), 15, condition)
 
 
@@ -65,7 +65,7 @@ def decimal(value, digits, unit):
 
 
 def wheel_words(wheel):
-    """Written here once more, from docs/user/northbound.md, not from the page."""
+    """A second implementation, from docs/user/northbound.md and not from the page."""
     words = {
         "heard": "OFFLINE" if not wheel["heard"] else "at standstill" if wheel["at_rest"] else "turning",
         "measured": decimal(wheel["speed_mm_s"], 0, "mm/s"),
@@ -148,14 +148,14 @@ def test_stop_button_is_on_the_bus_within_a_fifth_of_a_second(rig):
             since = now_us()
             press()
             braked_us = since + braking_ms(rig, since) * 1000
-            # From the press in the browser, not from our asking for it: its clock is compared with ours.
+            # From the press in the browser, not from the test's request for it: the browser's clock is compared with the test's.
             here, there = now_us(), page.evaluate("performance.now() - window.pressed")
             late_ms = (braked_us - here) / 1000 + there
             print(f"        from the press to a smaller setpoint on the bus: {late_ms:.0f} ms", flush=True)
             assert late_ms < 200, f"{late_ms} ms"
             seen(page, "document.querySelector('#delivered').textContent.startsWith('Stop delivered')")
             driver.end()
-            until(lambda: rig.ask_json("GET", "/api/status")[1]["state"] == "listening", what="the wheels stand")
+            until(lambda: rig.ask_json("GET", "/api/status")[1]["state"] == "listening", what="the wheels are at standstill")
 
 
 def test_estop_is_asked_for_once_more_and_cancelled_by_escape(rig):
@@ -203,7 +203,7 @@ def test_bridge_killed_and_back_the_page_says_so_and_goes_on(rig):
         rig.start_web()
         seen(page, "document.querySelector('#delivered').textContent.startsWith('Stop delivered')")
         live(page)
-        page.said.clear()  # The browser's own words about the lost connection.
+        page.said.clear()  # The browser's own message about the lost connection.
 
 
 def test_wrong_token_asks_for_another(rig):
@@ -225,7 +225,7 @@ def hold(page):
 
 
 def turns(rig):
-    return until(lambda: rig.bus.setpoints() and rig.bus.setpoints()[-1][2] > 60, 5, "the wheels are told to turn")
+    return until(lambda: rig.bus.setpoints() and rig.bus.setpoints()[-1][2] > 60, 5, "the wheels are commanded to turn")
 
 
 HIDE = "Object.defineProperty(document, 'hidden', {value: true, configurable: true}); document.dispatchEvent(new Event('visibilitychange'))"
@@ -241,7 +241,7 @@ def test_pad_drives_while_held_and_stops_when_released_or_hidden(rig):
         since = now_us()
         page.mouse.up()
         assert braking_ms(rig, since) < 500
-        until(lambda: rig.ask_json("GET", "/api/status")[1]["state"] == "listening", what="the wheels stand")
+        until(lambda: rig.ask_json("GET", "/api/status")[1]["state"] == "listening", what="the wheels are at standstill")
         page.mouse.down()
         turns(rig)
         since = now_us()
@@ -291,12 +291,12 @@ def test_pad_held_without_evidence_of_a_hand_stops_after_2_s(rig):
                 move(page, n)
             last = now_us()
             time.sleep(0.5)  # The last movement has also changed the setpoints.
-            assert rig.ask_json("GET", "/api/status")[1]["state"] == "armed", f"it stopped although a hand moved: {page.inner_text('#pad-says')}"
+            assert rig.ask_json("GET", "/api/status")[1]["state"] == "armed", f"it stopped although the finger moved: {page.inner_text('#pad-says')}"
             seen(page, "document.querySelector('#pad-says').textContent.includes('Nothing moves on the pad')")
             braked_ms = 500 + braking_ms(rig, last + 500_000, 3)
             assert 1700 < braked_ms < 2500, f"{braked_ms} ms"
             seen(page, "document.querySelector('#pad-says').textContent.includes('hold the pad again')")
-            until(lambda: rig.ask_json("GET", "/api/status")[1]["state"] == "listening", what="the wheels stand")
+            until(lambda: rig.ask_json("GET", "/api/status")[1]["state"] == "listening", what="the wheels are at standstill")
             move(page, 1)
             time.sleep(0.5)
             assert rig.ask_json("GET", "/api/status")[1]["state"] == "listening", "it began without a new press"
@@ -353,7 +353,7 @@ def test_plots_follow_freeze_zoom_and_are_saved(rig):
         newest = "plots.left.speed.uplot.scales.x.max"
         seen(page, f"{newest} > 0")
         page.click("#freeze")
-        time.sleep(0.2)  # What was on its way is drawn.
+        time.sleep(0.2)  # Values in transit are drawn.
         frozen = page.evaluate(newest)
         time.sleep(0.5)
         assert page.evaluate(newest) == frozen
@@ -513,7 +513,7 @@ def test_page_is_accessible_and_fits_each_theme_and_screen(rig):
 
 
 def press_stop(page, rig):
-    """Presses where STOP is seen on the screen, and measures until the bus."""
+    """Presses STOP at its place on the screen, and measures the time until the bus."""
     driver = Driver(rig)
     at = page.evaluate("""() => { const b = document.querySelector('#stop').getBoundingClientRect(), v = visualViewport;
         return [b.left + b.width / 2 - v.offsetLeft, b.top + b.height / 2 - v.offsetTop, v.width, v.height]; }""")
@@ -525,7 +525,7 @@ def press_stop(page, rig):
     assert late < 1000, f"{late} ms"
     driver.end()
     driver.client.close()
-    until(lambda: rig.ask_json("GET", "/api/status")[1]["state"] == "listening", what="the wheels stand")
+    until(lambda: rig.ask_json("GET", "/api/status")[1]["state"] == "listening", what="the wheels are at standstill")
 
 
 @pytest.mark.rig(driving=True)
@@ -537,7 +537,7 @@ def test_stop_never_dead_behind_a_question_of_the_page(rig):
             page.click(button)
             assert page.evaluate("document.querySelector('#ask').open")
             press_stop(page, rig)
-            assert not page.evaluate("document.querySelector('#ask').open"), "STOP answers the question with no"
+            assert not page.evaluate("document.querySelector('#ask').open"), "STOP closes the question with no"
             assert rig.ask_json("GET", "/api/status")[1]["state"] == "listening"
             assert not page.evaluate("drive.on")
             page.click(button)
@@ -575,7 +575,7 @@ def test_delivered_goes_with_the_next_state(rig):
         page.click("#stop")
         seen(page, "document.querySelector('#delivered').textContent.startsWith('Stop delivered')")
         driver.end()
-        until(lambda: rig.ask_json("GET", "/api/status")[1]["state"] == "listening", what="the wheels stand")
+        until(lambda: rig.ask_json("GET", "/api/status")[1]["state"] == "listening", what="the wheels are at standstill")
         seen(page, "document.querySelector('#delivered').textContent === ''")
 
 

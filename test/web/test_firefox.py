@@ -75,7 +75,7 @@ def test_firefox_stop_acts_by_each_input_above_dialogs(rig):
             late = braking_ms(rig, since)
             assert late < 1000, f"{way}: {late} ms"
             page.let_go()
-            assert not page.evaluate("document.querySelector('#ask').open"), "STOP answers the question with no"
+            assert not page.evaluate("document.querySelector('#ask').open"), "STOP closes the question with no"
             page.seen("document.querySelector('#delivered').textContent.startsWith('Stop delivered')")
             driver.end()
             driver.client.close()
@@ -108,7 +108,7 @@ def test_firefox_pad_drives_by_touch_until_released(rig):
             assert not page.evaluate("drive.held"), end
             page.let_go()
             stands(rig)
-            until(lambda: rig.ask_json("GET", "/api/status")[1]["lease"]["holder"] is None, what="nobody drives")
+            until(lambda: rig.ask_json("GET", "/api/status")[1]["lease"]["holder"] is None, what="no client drives")
 
 
 def test_firefox_plays_a_recording_and_speaks_german(rig):

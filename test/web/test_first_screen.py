@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a person sees first and always: figures without scrolling, STOP in every state of the page, and the pad with all that belongs to it."""
+"""What a person always sees on the first screen: figures without scrolling, STOP in every state of the page, and the pad with all that belongs to it."""
 
 import contextlib
 import json
@@ -210,7 +210,7 @@ def test_pad_in_each_size_is_visible_with_state_and_estop(rig):
             seen(page, "!document.querySelector('#ring').hidden && parseFloat(document.querySelector('#pad-measured').textContent) > 0.05")
             shot(page, f"pad-{size}")
             page.mouse.up()
-            until(lambda: rig.ask_json("GET", "/api/status")[1]["state"] == "listening", what="the wheels stand")
+            until(lambda: rig.ask_json("GET", "/api/status")[1]["state"] == "listening", what="the wheels are at standstill")
             page.click("#pad-off")
             assert page.evaluate("!drive.on && document.activeElement.id === 'arm'")
 
@@ -262,7 +262,7 @@ def test_pad_by_touch_drives_and_a_second_finger_stops(rig):
             assert braking_ms(rig, since) < 500, begins
             seen(page, "document.querySelector('#pad-says').textContent.includes('second finger')")
             fingers(session, "touchMove", (one[0] + 5, one[1]), second)
-            until(lambda: rig.ask_json("GET", "/api/status")[1]["state"] == "listening", what="the wheels stand")
+            until(lambda: rig.ask_json("GET", "/api/status")[1]["state"] == "listening", what="the wheels are at standstill")
             assert not page.evaluate("drive.held"), "a finger that stayed does not drive again"
             fingers(session, "touchEnd")
             time.sleep(0.6)
@@ -466,4 +466,4 @@ def test_pad_closes_when_the_bridge_forbids_driving(rig):
         live(page)
         seen(page, "!drive.on && document.querySelector('#drive').hidden")
         all_seen(page, ["word", "sentence", *FIGURES, "stop"], "without the pad")
-        page.said.clear()  # The browser's own words about the lost connection.
+        page.said.clear()  # The browser's own message about the lost connection.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Simulated wheels, gateway and web bridge in one private folder, and an HTTP client of ours that may send anything."""
+"""Simulated wheels, gateway and web bridge in one private folder, and an HTTP client of the tests that may send anything."""
 
 import hashlib
 import hmac
@@ -28,7 +28,7 @@ def free_port():
 
 
 class Person:
-    """A sender with a token, as docs/user/web.md writes it down: a session of its own, and a proof with each request."""
+    """A sender with a token, as in docs/user/web.md: it has its own session, and sends a proof with each request."""
 
     def __init__(self, rig, token=None):
         self.rig, self.token, self.session, self.sequence, self.challenge = rig, token, secrets.token_hex(16), 0, None
@@ -161,7 +161,7 @@ class WebRig(Rig):
             connection.close()
 
     def prove(self, method, path):
-        """A session lasts as long as the bridge that knows it."""
+        """A session lasts until the bridge ends."""
         if self.person.challenge is None or self.proved is not self.web:
             self.person.begin()
             self.proved = self.web
@@ -179,5 +179,5 @@ class WebRig(Rig):
 
 
 def page_folder(build):
-    """The page as it would be installed."""
+    """The page as an installation contains it."""
     return Path(build).resolve() / "app/bridge/web/page"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The UART code of the image on an STM32 that somebody else models: QEMU's, which has the USARTs and no DMA. First
+// The UART code of the image on an independent model of an STM32: QEMU's, which has the USARTs and no DMA. First
 // console.c as it is, which polls; then serial.c as it is, with a loop in the place of the DMA's two channels.
 #include "console.h"
 #include "serial.h"
