@@ -421,7 +421,8 @@ static void judge_silence(oracle_t *self, iw_time_us_t now_us, iw_time_us_t hand
     const bool runs = now_us - self->step_us < oracle_us(self->config->period_ms) + 10U * MS &&
                       now_us - self->late_us > given_us && self->received < DRAIN;
     if (self->purges && runs && oracle_elapsed(now_us, self->silent_us, given_us)) {
-        oracle_break(self, now_us, 607, "a setpoint of %llu us ago came out after the last zero although the port purges",
+        oracle_break(self, now_us, 607,
+                     "a setpoint of %llu us ago came out after the last zero although the port purges",
                      (unsigned long long)(now_us - handed_us));
     }
 }
