@@ -109,6 +109,9 @@ def findings(root):
 
 
 def main(arguments):
+    if "--help" in arguments:
+        print(__doc__)
+        return 0
     root = Path(arguments[1]).resolve() if len(arguments) > 1 else ROOT
     found = list(findings(root))
     print(*(f"failed: {finding}" for finding in found), sep="\n", end="\n" if found else "")

@@ -102,6 +102,9 @@ def rows_now(known, table):
 
 
 def main(arguments):
+    if "--help" in arguments:
+        print(__doc__)
+        return 0
     known, path = steps(), Path(next((word for word in arguments if not word.startswith("--")), TABLE))
     with open(path, newline="", encoding="utf-8") as file:
         table = {row["id"]: row for row in csv.DictReader(file)}

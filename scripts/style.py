@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Measures functions and files. Fails if a limit of the house style is exceeded, if a comment contains a name that does not exist, or if C code with
+"""Measures functions and files. Fails if a limit of the project's style is exceeded, if a comment contains a name that does not exist, or if C code with
 two valid forms does not have the form of this tree:
 
     i++;                            not ++i; where the value is not used
@@ -185,6 +185,9 @@ def dialect_findings(path, name, fix):
 
 
 def main(arguments):
+    if "--help" in arguments:
+        print(__doc__)
+        return 0
     fix, places = "--fix" in arguments, [word for word in arguments[1:] if word != "--fix"]
     root = Path(places[0] if places else Path(__file__).resolve().parent.parent).resolve()
     findings = [finding for path in sources(root, DIALECT) for finding in dialect_findings(path, path.relative_to(root), fix)]

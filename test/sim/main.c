@@ -10,19 +10,17 @@
 #define EXIT_USAGE  64
 
 static void usage(FILE *out) {
-    fputs(
-        "usage: test_sim [--seed N [--trace] [--events]] | [--first N] [--count N | --hours H | --hashes] | "
-        "--directed\n"
-        "Plays seeds through the real core in virtual time and judges each by the rules of motion permission.\n"
-        "A seed that fails is made small and printed as a timeline. --seed N plays one seed and prints the hash of all "
-        "that "
-        "was sent.\n"
-        "--hashes plays --count seeds and prints only their hashes, for comparison between machines. --directed plays "
-        "a\n"
-        "node that babbles with lower and with higher ids. --quick ends at the first seed that fails, which is not "
-        "made small.\n"
-        "The line `summary ...` sums up the run; the last line is `N passed, N failed, N skipped`.\n",
-        out);
+    fputs("usage: test_sim [--seed N [--trace] [--events]] | [--first N] [--count N | --hours H | --hashes] | "
+          "--directed\n"
+          "Simulates seeds with the real core in virtual time and judges each by the rules of motion permission.\n"
+          "A seed that fails is reduced to its shortest form and printed as a timeline.\n"
+          "--seed N simulates one seed and prints the hash of everything that was sent; --trace prints its timeline, "
+          "--events its events.\n"
+          "--hashes simulates --count seeds and prints only their hashes, to compare machines.\n"
+          "--directed simulates a node that babbles with lower and with higher ids.\n"
+          "--quick ends at the first seed that fails, without reducing it.\n"
+          "The line `summary ...` sums up the run; the last line is `N passed, N failed, N skipped`.\n",
+          out);
 }
 
 static scenario_t scenario;
