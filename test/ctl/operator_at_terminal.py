@@ -47,7 +47,7 @@ class Operator:
         return bool(data)
 
     def expect(self, text, seconds=20.0):
-        """What came before `text` and after the last one; raises if it does not come."""
+        """Returns the output between the previous text and `text`; raises if `text` does not arrive."""
         end = time.monotonic() + seconds
         words = re.compile(re.escape(text).replace(r"\ ", r"[ \n]"))  # A paragraph may be broken anywhere.
         while True:

@@ -2,7 +2,7 @@
 /// Everything outside the gateway's process: bus and wheels (the simulator's model), button, clients, service manager, and their
 /// faults. One scenario at a time, drawn from a seed; the same seed leads to the same run, to the microsecond.
 ///
-/// Chaos comes first; then all faults end, a well-behaved client must be able to drive, and the wheels come to standstill after it has gone.
+/// Chaos comes first; then all faults end, a well-behaved client must be able to drive, and the wheels are at standstill after it has disconnected.
 #ifndef DAEMON_WORLD_H
 #define DAEMON_WORLD_H
 

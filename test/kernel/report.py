@@ -61,8 +61,9 @@ There are two kinds of time:
   right setpoint, the kernel may run another process for that long. Pairs may therefore need one tick more than the 5 ms
   of virtual time.
 
-In row 31, one wheel moves differently from the other. [pair.md](../user/pair.md) has the angles, before and after. The
-[safety case](safety-case.md#the-fault-catalogue) has the rows 32 to 34, and the tests of all other rows.
+In row 31, one wheel moves differently from the other. [pair.md](../user/pair.md) shows how far each such fault turns the
+machine, with the rule of the pair and before it. The [safety case](safety-case.md#the-fault-catalogue) has the rows 32
+to 34, and the tests of all other rows.
 
 | # | fault | tests: kernel | tests: local bus | longest gap | stop begins within | old frames |
 |---|---|---|---|---|---|---|

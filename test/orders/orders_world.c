@@ -271,7 +271,7 @@ static void kill_client(world_t *self) {
     wake(self);
 }
 
-/// Frames that the dead process sent are still in flight, and are foreign frames for the new process.
+/// Frames of the killed process are still in transit, and are foreign frames for the new process.
 static void restart(world_t *self) {
     const bool idle = !iw_gateway_is_sending(&self->gateway);
     for (uint32_t i = 0; i < self->flights; i++) {

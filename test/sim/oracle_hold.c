@@ -45,9 +45,9 @@ void oracle_judge_hold_state(oracle_t *self, iw_time_us_t now_us, iw_state_t sta
         return;
     }
     if (self->restarting) {
-        oracle_break(self, now_us, 822, "silent although the hold of the dead process is to be resumed");
+        oracle_break(self, now_us, 822, "silent although the hold of the killed process must be resumed");
     } else {
-        oracle_break(self, now_us, 818, "silent although zeros are to be held");
+        oracle_break(self, now_us, 818, "silent although zeros must be held");
     }
 }
 

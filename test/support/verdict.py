@@ -55,7 +55,7 @@ def hold(condition, text):
 
 
 class Found(AssertionError):
-    """A test, or pytest_verdict.py for it, raises this with failures of which it knows more than their texts."""
+    """A test, or pytest_verdict.py for it, raises this with failures that have more data than their texts."""
 
     def __init__(self, failures):
         super().__init__("\n".join(f"{failure.kind}: {failure.text}" for failure in failures))

@@ -61,7 +61,7 @@ class Client:
             self.events.append(line)
 
     def collect(self, seconds=0.0):
-        """Events that came, waiting that long for more."""
+        """Returns the received events, after waiting that long for more."""
         deadline = time.monotonic() + seconds
         with self.lock:
             while True:

@@ -76,7 +76,7 @@ class Judge(Reading):
             self._say("motion_without_drive", t_us, f"{name} without a fresh drive command since arm")
             return
         if any(begin + 2 * ECHO_US < t_us < end for begin, end in self.dead):
-            self._say("motion_on_dead_bus", t_us, f"{name} while the bus took no frames")
+            self._say("motion_on_dead_bus", t_us, f"{name} while the bus accepted no frames")
         if self._is_residual(setpoint):
             return
         self._within_command(setpoint, previous, drives)

@@ -147,7 +147,7 @@ class Reading:
         return [(b, b - a) for a, b in itertools.pairwise(times) if b - a > BUS_STALL_US]
 
     def machine_stalls(self):
-        """When whatever runs the wheels was stalled for certain, [(until_us, for_us)]; a rig that measures it knows."""
+        """When the program that runs the wheels was certainly stalled, [(until_us, for_us)]; only rigs that measure it report this."""
         return []
 
     def _is_dead(self, from_us, to_us):

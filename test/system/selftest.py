@@ -157,14 +157,14 @@ def faults():
     yield "wheels that never turn", [x if is_setpoint(x) else x._replace(data=bytes(4)) for x in f], e, "never_turned"
     yield "armed, but nothing is sent", between(f, 0, 99_999, drop), e, "never_sent"
     yield "one wheel never sent to", between(f, 0, 99_999, only(1, drop)), e, "never_sent"
-    yield "a zero pair before anybody armed", add(f, *pair(1_200, 0, 0)), e, "sent_in_listening"
-    yield "a moving pair before anybody armed", add(f, *pair(1_200, 100, 100)), e, "motion_unarmed"
+    yield "a zero pair before the first arm", add(f, *pair(1_200, 0, 0)), e, "sent_in_listening"
+    yield "a moving pair before the first arm", add(f, *pair(1_200, 100, 100)), e, "motion_unarmed"
     yield "motion by arming alone", between(f, 1_600, 1_640, with_data(1, 8)), e, "motion_without_drive"
     yield "motion after reset, arm without drive", f, without(e, "drive", 5_650, 6_700), "motion_without_drive"
-    yield "100 ms of silence while armed", between(f, 2_500, 2_610, drop), e, "gap"
-    yield "200 ms of silence of the right wheel", between(f, 2_500, 2_700, only(1, drop)), e, "gap"
-    yield "silence during the ramp", between(f, 6_720, 6_850, drop), e, "gap"
-    yield "silence in the hold", between(f, 7_500, 7_700, drop), e, "gap"
+    yield "100 ms without setpoints while armed", between(f, 2_500, 2_610, drop), e, "gap"
+    yield "200 ms without setpoints for the right wheel", between(f, 2_500, 2_700, only(1, drop)), e, "gap"
+    yield "no setpoints during the ramp", between(f, 6_720, 6_850, drop), e, "gap"
+    yield "no setpoints in the hold", between(f, 7_500, 7_700, drop), e, "gap"
     yield "hold 300 ms too short", between(f, 8_050, 8_400, drop), e, "gap"
     yield "no hold after an e-stop", between(f, 3_560, 5_100, drop), e, "gap"
     yield "listening again 700 ms too early", between(f, 10_590, 99_999, drop), [*e, Event(10600 * MS, "silent")], "gap", {"finished_us": 10_700 * MS}
@@ -249,7 +249,7 @@ def goods():
         ("eight bytes", CONFIG._replace(dlc=8, setpoint_type=7)),
     ):
         yield name, good(config), e, {"config": config}
-    yield "foreign frames of the scenario's own", add(f, *(x._replace(own=True) for x in pair(12_000, 900, 900))), e, {}
+    yield "foreign frames that the scenario itself sent", add(f, *(x._replace(own=True) for x in pair(12_000, 900, 900))), e, {}
     yield "one pair on its way at the e-stop", add(f, *pair(3_520.2, 300, 300)), e, {}
     off = [Event(9_500 * MS, "dead"), Event(9_500 * MS, "cut", within_us=50 * MS), Event(12_000 * MS, "alive", 12_000 * MS)]
     yield (

@@ -175,7 +175,7 @@ TEST(test_blackbox_assumption_has_state_of_restored_item) {
     TEST_ASSERT_EQUAL_UINT8(IW_CONFIRMED, entry.b);
 }
 
-/// At standstill the frames of a step stand for the step and have its time.
+/// At standstill the frames of a step have the time of the step.
 TEST(test_blackbox_frames_have_the_time_of_their_step) {
     unsigned frames = 0;
     for (unsigned ms = 0; ms < 100U; ms++) {

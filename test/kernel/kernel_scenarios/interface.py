@@ -410,7 +410,7 @@ def power_cut(t, setup):
     why = client.request("why")
     t.check(client.request("status")["state"] == "latched", "latched")
     t.measure("stop_ms", (why["at_us"] - fault_us) / 1000 if why["at_us"] else 0)
-    t.check(not client.request("reset")["ok"], "reset waits until the wheels are heard")
+    t.check(not client.request("reset")["ok"], "reset is refused until the wheels are online")
     time.sleep(10)
     held_us = now_us()
     if "plug" in netdev.command("tc", "qdisc", "show", "dev", rig.interface):

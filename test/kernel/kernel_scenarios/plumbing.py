@@ -72,7 +72,7 @@ def plumbing_discipline(t):
         netdev.discipline("vcan9")
         t.check(error_of(other) is None, "the default accepts frames again")
         netdev.down("vcan9")
-        t.check(error_of(other) == errno.ENETDOWN, "down is told")
+        t.check(error_of(other) == errno.ENETDOWN, "the interface that is down is reported")
         netdev.up("vcan9")
     t.figure(f"echo after {delay_ms:.1f} ms of 200 ms")
     bus.close()
@@ -129,7 +129,7 @@ def plumbing_late_interface(t):
     t.check(len(seen(bus, 100)) >= 100, f"{len(bus.frames)} frames in two seconds")
     simulator.terminate()
     said = simulator.communicate()[0]
-    t.check("the interface is up" in said and "was stopped for" not in said, f"it said {said}")
+    t.check("the interface is up" in said and "was stopped for" not in said, f"its output is {said}")
     bus.close()
     netdev.delete("vcan9")
 

@@ -39,7 +39,7 @@ def only_zeros(t, rig, since_us):
 
 
 def bus_off(t, off, on):
-    """`off` and `on` take the controller off the bus and put it back."""
+    """`off` and `on` disconnect the controller from the bus and connect it again."""
     rig, client, stream = driving(t)
     observer = rig.client("observer")
     observer.request("watch", topics=["bus", "stop"])
@@ -208,12 +208,12 @@ def held_up(t, words, seconds, causes):
     t.judge(rig)
 
 
-@scenario("no echo for 300 ms in motion: stop, latched; nothing stale drains afterwards", 7)
+@scenario("no echo for 300 ms in motion: stop, latched; no stale frame is sent afterwards", 7)
 def row17_no_acknowledge(t):
     held_up(t, "ack", 0.3, ("send_stalled",))
 
 
-@scenario("the bus takes no frame for 2 s in motion: stop, latched; nothing stale drains afterwards", 8)
+@scenario("the bus accepts no frame for 2 s in motion: stop, latched; no stale frame is sent afterwards", 8)
 def row17_stall(t):
     held_up(t, "stall", 2.0, ("send_stalled", "wheel_lost"))
 
