@@ -111,7 +111,7 @@ def test_stop_is_usable_above_dialogs_zoomed_and_in_large_text(rig):
                     shot(page, f"stop-{size}-{zoom}-{text}-{button[1:]}")
                     assert page.evaluate("document.querySelector('#ask').open")
                     press_stop(page, rig)
-                    assert not page.evaluate("document.querySelector('#ask').open"), "STOP answers the question with no"
+                    assert not page.evaluate("document.querySelector('#ask').open"), "STOP closes the question with no"
                 box = page.evaluate(
                     "(() => { const r = document.querySelector('#stop').getBoundingClientRect(), v = visualViewport; return [r.width / v.width, r.height * v.scale]; })()"
                 )

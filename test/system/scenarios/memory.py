@@ -85,7 +85,7 @@ def memory_survives_a_crash(t):
     t.expect(client.request("tare", side="left"))
     t.check(client.wait_event("offset", side="left", provenance="operator"), "a new tare is reported by an event")
     t.check("left force offset: " in rig.gateway.text() and "before: " in rig.gateway.text(), "and in the log")
-    t.rule(not rig.bus.setpoints(), "nothing of that sends anything")
+    t.rule(not rig.bus.setpoints(), "none of these requests sends a setpoint")
     t.judge(rig, moves=False)
 
 
