@@ -190,7 +190,15 @@ class Others(unittest.TestCase):
         self.assertEqual([], os.listdir(self.folder))
 
     def test_options_without_effect_are_refused(self):
-        for words, said in ((("--port", "8000"), "--port is for"), (("--web", "--port", "70000"), "1 to 65534"), (("--ros", "--keep"), "--keep is for")):
+        for words, said in (
+            (("--port", "8000"), "--port is for"),
+            (("--web", "--port", "70000"), "1 to 65534"),
+            (("--ros", "--keep"), "--keep is for"),
+            (("--mcu", "--plain"), "leave out --plain"),
+            (("--plain", "--web"), "leave out --plain"),
+            (("--lan",), "./demo --web --lan"),
+            (("--fleet", "--lan"), "./demo --web --lan"),
+        ):
             done = subprocess.run([os.path.join(ROOT, "demo"), *words], capture_output=True, text=True, timeout=20, check=False)
-            self.assertEqual(done.returncode, 64)
+            self.assertEqual(done.returncode, 64, (words, done.stderr))
             self.assertIn(said, done.stderr)
