@@ -19,9 +19,11 @@
 #define DAY_S      86400
 #define NAME_SIZE  65U
 
-static int complain(const char *what, const char *why) {
-    (void)fprintf(stderr, "iwheel-web: %s: %s; let token_file name a folder in which the bridge may write\n", what,
-                  why);
+#define NO_WRITE "let token_file name a folder in which the bridge may write"
+#define NO_MAKE  "set certificate and key in the configuration, or leave out --lan"
+
+static int complain(const char *what, const char *why, const char *fix) {
+    (void)fprintf(stderr, "iwheel-web: %s: %s; %s\n", what, why, fix);
     return EX_CANTCREAT;
 }
 
@@ -35,9 +37,11 @@ bool web_lan_address(char out[INET_ADDRSTRLEN]) {
     const bool good = fd >= 0 && connect(fd, (const struct sockaddr *)&there, sizeof there) == 0 &&
                       getsockname(fd, (struct sockaddr *)&here, &size) == 0 &&
                       inet_ntop(AF_INET, &here.sin_addr, out, INET_ADDRSTRLEN) != NULL;
+    const int error = errno;
     if (fd >= 0) {
         (void)close(fd);
     }
+    errno = error;
     return good;
 }
 
@@ -48,17 +52,25 @@ static void host_name(char out[NAME_SIZE]) {
     out[NAME_SIZE - 1U] = '\0';
 }
 
-/// Writes a new file and renames it, so that no program reads an incomplete file. Only the owner may read it.
-static bool write_file(const char *path, const gnutls_datum_t *data) {
+/// Writes a new file and renames it, so that no program reads an incomplete file. Only the owner may read it. Returns 0,
+/// or an exit code with a line on stderr.
+static int write_file(const char *path, const gnutls_datum_t *data) {
     char beside[128];
     (void)snprintf(beside, sizeof beside, "%s.new", path);
     (void)unlink(beside);
     const int file = open(beside, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0600);
-    const bool written = file >= 0 && write(file, data->data, data->size) == (ssize_t)data->size;
-    if (file >= 0) {
-        (void)close(file);
+    if (file < 0) {
+        return complain(beside, strerror(errno), NO_WRITE);
     }
-    return written && rename(beside, path) == 0;
+    errno = ENOSPC; // A short write sets no errno.
+    const bool written = write(file, data->data, data->size) == (ssize_t)data->size;
+    const int error = errno;
+    (void)close(file);
+    if (!written) {
+        return complain(beside, strerror(error),
+                        "make room on this disk, or let token_file name a folder on another one");
+    }
+    return (rename(beside, path) == 0) ? 0 : complain(path, strerror(errno), "remove it, and start the bridge again");
 }
 
 /// Adds the names and addresses by which a browser may call this machine.
@@ -109,9 +121,12 @@ static int write_pair(const web_settings_t *settings, gnutls_x509_crt_t certific
     error = (error == 0) ? fill(certificate, key) : error;
     error = (error == 0) ? gnutls_x509_privkey_export2(key, GNUTLS_X509_FMT_PEM, &key_text) : error;
     error = (error == 0) ? gnutls_x509_crt_export2(certificate, GNUTLS_X509_FMT_PEM, &text) : error;
-    int code = (error == 0) ? 0 : complain("the certificate cannot be made", gnutls_strerror(error));
-    if (code == 0 && (!write_file(settings->web.key, &key_text) || !write_file(settings->web.certificate, &text))) {
-        code = complain(settings->web.certificate, strerror(errno));
+    int code = (error == 0) ? 0 : complain("the certificate cannot be made", gnutls_strerror(error), NO_MAKE);
+    if (code == 0) {
+        code = write_file(settings->web.key, &key_text);
+    }
+    if (code == 0) {
+        code = write_file(settings->web.certificate, &text);
     }
     gnutls_memset(key_text.data, 0, key_text.size);
     gnutls_free(key_text.data);
@@ -122,28 +137,49 @@ static int write_pair(const web_settings_t *settings, gnutls_x509_crt_t certific
 static int make_pair(const web_settings_t *settings) {
     gnutls_x509_crt_t certificate = NULL;
     gnutls_x509_privkey_t key = NULL;
-    int code = EX_OSERR;
-    if (gnutls_x509_crt_init(&certificate) == 0 && gnutls_x509_privkey_init(&key) == 0) {
-        code = write_pair(settings, certificate, key);
-    }
+    int error = gnutls_x509_crt_init(&certificate);
+    error = (error == 0) ? gnutls_x509_privkey_init(&key) : error;
+    const int code = (error == 0) ? write_pair(settings, certificate, key)
+                                  : complain("the certificate cannot be made", gnutls_strerror(error), NO_MAKE);
     gnutls_x509_privkey_deinit(key);
     gnutls_x509_crt_deinit(certificate);
     return code;
 }
 
-/// Returns true if there is a certificate that has not expired. The start of the bridge checks whether the key matches.
-static bool is_good(const web_settings_t *settings) {
+/// Returns NULL if this is a certificate that has not expired; otherwise why it is not used.
+static const char *fault_of(const char *path) {
     gnutls_datum_t text = {NULL, 0};
     gnutls_x509_crt_t certificate = NULL;
-    bool good = access(settings->web.key, R_OK) == 0 && gnutls_load_file(settings->web.certificate, &text) == 0 &&
-                gnutls_x509_crt_init(&certificate) == 0 &&
-                gnutls_x509_crt_import(certificate, &text, GNUTLS_X509_FMT_PEM) == 0 &&
-                gnutls_x509_crt_get_expiration_time(certificate) > time(NULL) + DAY_S;
+    int error = gnutls_load_file(path, &text);
+    error = (error == 0) ? gnutls_x509_crt_init(&certificate) : error;
+    error = (error == 0) ? gnutls_x509_crt_import(certificate, &text, GNUTLS_X509_FMT_PEM) : error;
+    const char *fault = (error == 0) ? NULL : gnutls_strerror(error);
+    if (error == 0 && gnutls_x509_crt_get_expiration_time(certificate) <= time(NULL) + DAY_S) {
+        fault = "it has expired";
+    }
     if (certificate != NULL) {
         gnutls_x509_crt_deinit(certificate);
     }
     gnutls_free(text.data);
-    return good;
+    return fault;
+}
+
+/// Returns true if there is a certificate to use. Reports why an existing one is replaced. The start of the bridge
+/// checks whether the key matches.
+static bool is_good(const web_settings_t *settings) {
+    const char *path = settings->web.key;
+    const int error = (access(path, R_OK) == 0) ? 0 : errno;
+    const char *fault = (error == 0) ? NULL : strerror(error);
+    bool exists = error != ENOENT;
+    if (fault == NULL) {
+        path = settings->web.certificate;
+        fault = fault_of(path);
+        exists = access(path, F_OK) == 0;
+    }
+    if (fault != NULL && exists) {
+        (void)complain(path, fault, "the bridge makes a new certificate, and each phone warns once more");
+    }
+    return fault == NULL;
 }
 
 /// Adds the names of this machine to `hosts` of the configuration.
@@ -154,6 +190,8 @@ static void add_host(web_settings_t *settings) {
     (void)snprintf(all, sizeof all, "%s %s %s.local", web_settings_hosts(settings), name, name);
     if (strlen(all) < sizeof settings->web.hosts) {
         memcpy(settings->web.hosts, all, strlen(all) + 1U);
+    } else {
+        (void)complain("hosts", "there is no room for the name of this machine", "shorten hosts in the configuration");
     }
 }
 
@@ -170,7 +208,8 @@ int web_lan_prepare(web_settings_t *settings) {
     const int other =
         snprintf(settings->web.key, sizeof settings->web.key, "%.*slan-key.pem", length, settings->web.token_file);
     if (one >= (int)sizeof settings->web.certificate || other >= (int)sizeof settings->web.key) {
-        return complain(settings->web.token_file, "its folder's name is too long");
+        return complain(settings->web.token_file, "its folder's name is too long",
+                        "let token_file name a folder with a shorter name");
     }
     return is_good(settings) ? 0 : make_pair(settings);
 }

@@ -12,7 +12,8 @@
 /// the token, and made again when it has expired. Returns 0, or an exit code with a line on stderr.
 int web_lan_prepare(web_settings_t *settings);
 
-/// Writes the address by which other machines reach this machine. Returns false if there is none.
+/// Writes the address by which other machines reach this machine. Returns false with the reason in errno if there is
+/// none.
 bool web_lan_address(char out[INET_ADDRSTRLEN]);
 
 #endif

@@ -9,6 +9,7 @@
 #ifdef IWHEEL_WEB_QR
 #include <qrencode.h>
 #endif
+#include <errno.h>
 #include <string.h>
 #include <sysexits.h>
 #include <unistd.h>
@@ -28,6 +29,9 @@ static void print_qr(const char *text) {
 #ifdef IWHEEL_WEB_QR
     QRcode *code = (isatty(STDOUT_FILENO) == 1) ? QRcode_encodeString(text, 0, QR_ECLEVEL_L, QR_MODE_8, 1) : NULL;
     const int border = 2;
+    if (code == NULL && isatty(STDOUT_FILENO) == 1) {
+        (void)fprintf(stderr, "iwheel-web: no QR code: %s; type the address into the phone\n", strerror(errno));
+    }
     for (int y = -border; code != NULL && y < code->width + border; y += 2) {
         (void)fputs("\033[30;107m", stdout);
         for (int x = -border; x < code->width + border; x++) {
@@ -43,6 +47,16 @@ static void print_qr(const char *text) {
 #endif
 }
 
+/// Returns 0 if the output was written, or an exit code with a line on stderr.
+static int end_output(void) {
+    if (fflush(stdout) == 0) {
+        return 0;
+    }
+    (void)fprintf(stderr, "iwheel-web: standard output: %s; send it to a terminal, or to a file with room\n",
+                  strerror(errno));
+    return EX_IOERR;
+}
+
 static int print_read(const web_settings_t *settings) {
     web_token_t token = {.path = settings->web.token_file, .only_reads = true};
     char secret[BRIDGE_SECRET_SIZE];
@@ -52,7 +66,7 @@ static int print_read(const web_settings_t *settings) {
     }
     web_read_secret(token.text, secret);
     (void)printf("%s\n", secret);
-    return 0;
+    return end_output();
 }
 
 static int print_url(const web_settings_t *settings) {
@@ -65,11 +79,15 @@ static int print_url(const web_settings_t *settings) {
     char name[128];
     if (web_settings_is_unix(settings)) {
         (void)printf("http://HOST-OF-YOUR-PROXY/#token=%s\n", token.text);
-        return 0;
+        return end_output();
     }
     (void)snprintf(name, sizeof name, "%s", settings->web.listen);
-    if (wild && !web_lan_address(name) && gethostname(name, sizeof name - 1U) != 0) {
-        (void)snprintf(name, sizeof name, "localhost");
+    if (wild && !web_lan_address(name)) {
+        (void)fprintf(stderr, "iwheel-web: no address for other machines: %s; connect this machine to a network\n",
+                      strerror(errno));
+        if (gethostname(name, sizeof name - 1U) != 0) {
+            (void)snprintf(name, sizeof name, "localhost");
+        }
     }
     const bool v6 = strchr(name, ':') != NULL;
     char url[256];
@@ -77,8 +95,7 @@ static int print_url(const web_settings_t *settings) {
                    v6 ? "[" : "", name, v6 ? "]" : "", settings->web.port, token.text);
     (void)printf("%s\n", url);
     print_qr(url);
-    (void)fflush(stdout);
-    return 0;
+    return end_output();
 }
 
 static int check(const web_settings_t *settings) {
@@ -90,6 +107,7 @@ static int check(const web_settings_t *settings) {
     web_server_close(&server);
     if (code == 0) {
         (void)printf("iwheel-web: configuration and files are in order\n");
+        code = end_output();
     }
     return code;
 }
