@@ -70,7 +70,7 @@ static void tell_state(const iw_snapshot_t *seen, bool estop_pressed) {
     brd_console_text(iwn_bus_state_name(seen->bus));
     brd_console_text(estop_pressed ? "; e-stop pressed" : "; e-stop released");
     if (state == IW_STATE_LATCHED) {
-        brd_console_text("; to reset: mend the cause, release the e-stop, then press the button on");
+        brd_console_text("; to reset: fix the cause, release the e-stop, then press the button on");
         pin(BRD_BUTTON);
     }
     brd_console_text("\r\n");
