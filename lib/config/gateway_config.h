@@ -50,15 +50,15 @@ typedef struct gateway_config {
         uint16_t discrepancy_ms;          ///< Longest difference of the contacts, 50..1000, more than `debounce_ms`.
     } estop;
     struct {
-        char socket[GATEWAY_PATH_SIZE];
-        uint16_t mode;        ///< Permission bits of the socket; always with read and write of the owner.
-        char group[33];       ///< Group of the socket; `none`: the group of the gateway.
-        uint16_t max_clients; ///< Clients, 1..64.
+        char socket[GATEWAY_PATH_SIZE]; ///< Path of the socket for clients that may drive.
+        uint16_t mode;                  ///< Permission bits of the socket; always with read and write of the owner.
+        char group[33];                 ///< Group of the socket; `none`: the group of the gateway.
+        uint16_t max_clients;           ///< Clients, 1..64.
         char watch_socket[GATEWAY_PATH_SIZE]; ///< Socket for clients that may not drive; `none` if there is none.
-        uint16_t watch_mode;
-        char watch_group[33];
-        uint16_t max_watchers; ///< Watchers, 1..64, in addition to max_clients.
-        uint16_t max_age_ms;   ///< Largest age in ms of `t_us` in arm, reset, release and confirm, 200..2000.
+        uint16_t watch_mode;                  ///< Like `mode`, for the watch socket.
+        char watch_group[33];                 ///< Like `group`, for the watch socket.
+        uint16_t max_watchers;                ///< Watchers, 1..64, in addition to max_clients.
+        uint16_t max_age_ms; ///< Largest age in ms of `t_us` in arm, reset, release and confirm, 200..2000.
     } northbound;
     struct {
         bool has_battery;               ///< A battery threshold is configured; it has no default.
@@ -67,9 +67,9 @@ typedef struct gateway_config {
         uint16_t temperature_high_degC; ///< 20..200; 0 without a threshold.
     } health;                           ///< [limits]
     struct {
-        uint16_t blackbox_s; ///< Length of the ring in memory, 0 (none)..600.
-        char directory[GATEWAY_PATH_SIZE];
-        uint16_t keep_stops; ///< 8..GW_BOX_KEEP_MAX.
+        uint16_t blackbox_s;               ///< Length of the ring in memory, 0 (none)..600.
+        char directory[GATEWAY_PATH_SIZE]; ///< Directory of the recordings.
+        uint16_t keep_stops;               ///< Recordings of stops that are stored on disk, 8..256.
     } record;
 } gateway_config_t;
 

@@ -19,35 +19,39 @@
 
 /// Limit of findings, above that of all judges together. Further findings are only counted.
 #define INSPECT_FINDINGS_MAX 40U
-#define INSPECT_TEXT_SIZE    320U
-#define INSPECT_FIX_SIZE     320U
+#define INSPECT_TEXT_SIZE    320U ///< Size of the text of a finding, with its terminator.
+#define INSPECT_FIX_SIZE     320U ///< Size of the fix of a finding, with its terminator.
 
-/// INSPECT_SKIP: this machine has no such device to check.
+/// Result of a check. INSPECT_SKIP: this machine has no such device to check.
 typedef enum { INSPECT_OK = 0, INSPECT_WARN, INSPECT_FAIL, INSPECT_SKIP } inspect_verdict_t;
 #define INSPECT_VERDICTS 4U
 
+/// One finding.
 typedef struct {
-    const char *check; ///< Subject: a word of a closed list (docs/user/doctor.md).
-    inspect_verdict_t verdict;
+    const char *check;            ///< Subject: a word of a closed list (docs/user/doctor.md).
+    inspect_verdict_t verdict;    ///< Result of the check.
     char text[INSPECT_TEXT_SIZE]; ///< State.
     char fix[INSPECT_FIX_SIZE];   ///< Fix; empty if there is nothing to fix.
 } inspect_finding_t;
 
+/// A list of findings, owned by the caller. One list belongs to one thread.
 typedef struct {
-    inspect_finding_t finding[INSPECT_FINDINGS_MAX];
-    unsigned count;
-    unsigned lost;                    ///< Number of findings that did not fit.
+    inspect_finding_t finding[INSPECT_FINDINGS_MAX]; ///< The first `count` entries are valid.
+    unsigned count;                                  ///< Number of stored findings.
+    unsigned lost;                                   ///< Number of findings that did not fit.
     unsigned total[INSPECT_VERDICTS]; ///< Number of findings by verdict, including those that did not fit.
     inspect_verdict_t absent;         ///< Verdict for a machine without CAN or GPIO: INSPECT_FAIL unless set otherwise.
 } inspect_findings_t;
 
+/// Empties the list and sets `absent` to INSPECT_FAIL.
 void inspect_begin(inspect_findings_t *self);
 
-/// Adds a finding without a fix. `check` must be a literal.
+/// Adds a finding without a fix; counts it in `lost` if the list is full. `check` must be a literal: the list has only
+/// its address. A text that is too long is cut.
 __attribute__((format(printf, 4, 5))) void inspect_say(inspect_findings_t *self, const char *check,
                                                        inspect_verdict_t verdict, const char *format, ...);
 
-/// Sets the fix of the last finding.
+/// Sets the fix of the last finding, cut if it is too long. Nothing if the list has lost a finding.
 __attribute__((format(printf, 2, 3))) void inspect_fix(inspect_findings_t *self, const char *format, ...);
 
 /// Returns "ok", "warn", "fail" or "skip".
@@ -67,6 +71,7 @@ uint32_t inspect_nominal_mHz(const iw_codec_row_t *row);
 /// Returns true if a wheel with power always sends this message, not only in its first minute.
 bool inspect_always(const iw_codec_row_t *row);
 
+/// Frames that were received in a time.
 typedef struct {
     uint32_t count[IW_CODEC_ROWS]; ///< Good frames in the order of `iw_codec_rows`, without the echoes of this program.
     uint32_t bad_length;           ///< Frames with a known id, shorter than in the table.
@@ -82,8 +87,10 @@ typedef struct {
     int estop;                              ///< Last result of the e-stop, as in iw_hal_t.
 } inspect_traffic_t;
 
+/// Begins without a frame, with the bus active and the e-stop unreadable.
 void inspect_traffic_begin(inspect_traffic_t *self);
 
+/// Counts one received frame.
 void inspect_traffic_count(inspect_traffic_t *self, const iw_can_frame_t *frame);
 
 /// Receives for this time. It blocks. The HAL must be open.
@@ -102,11 +109,11 @@ uint32_t inspect_load_permille(const inspect_traffic_t *self, uint32_t bitrate_h
 
 /// Expected properties of the bus.
 typedef struct {
-    const char *name; ///< Interface or unix:PATH.
-    uint32_t bitrate_hz;
-    uint16_t sample_point_permille;
-    bool refuses;         ///< A wrong bit timing is a failure, not a warning.
-    bool others_may_send; ///< A gateway runs on this bus: setpoints may be its own, and it judges others.
+    const char *name;               ///< Interface or unix:PATH.
+    uint32_t bitrate_hz;            ///< Bit rate in bit/s.
+    uint16_t sample_point_permille; ///< Sample point.
+    bool refuses;                   ///< A wrong bit timing is a failure, not a warning.
+    bool others_may_send;           ///< A gateway runs on this bus: setpoints may be its own, and it judges others.
 } inspect_config_t;
 
 /// Judges presence, mode, bit timing, queue, restart-ms and echo. Nothing for the local bus.
@@ -124,10 +131,10 @@ typedef struct {
     const char *line;       ///< Configured name.
     const char *pressed_at; ///< Pressed or unreadable contact of two, by `inspect_pressed_at`; NULL with one contact.
     bool present;           ///< False if there is no e-stop.
-    bool simulated;
-    int level;           ///< As in iw_hal_t: 0 released, > 0 pressed, < 0 unreadable.
-    const char *trouble; ///< Reason why it is unreadable, and the fix; may be empty.
-    bool no_gpio;        ///< It would be a GPIO line, and this machine has no GPIO.
+    bool simulated;         ///< It is a simulated button.
+    int level;              ///< As in iw_hal_t: 0 released, > 0 pressed, < 0 unreadable.
+    const char *trouble;    ///< Reason why it is unreadable, and the fix; may be empty.
+    bool no_gpio;           ///< It would be a GPIO line, and this machine has no GPIO.
 } inspect_estop_t;
 
 /// Returns the state from an open HAL, by its last reading.
@@ -147,9 +154,9 @@ void inspect_unopened(const char *cause, bool is_bus, int error, inspect_finding
 
 /// Parts that could be opened.
 typedef struct {
-    bool hal; ///< The HAL is open and must be closed.
-    bool bus;
-    bool estop;
+    bool hal;   ///< The HAL is open and must be closed.
+    bool bus;   ///< The bus is open.
+    bool estop; ///< The e-stop is open.
 } inspect_opened_t;
 
 /// Opens bus and e-stop for the checks. A part that cannot be opened becomes a finding, and the other one is opened

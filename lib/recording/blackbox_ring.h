@@ -11,37 +11,42 @@
 
 #include <stdatomic.h>
 
-#define BLACKBOX_BLOCK 1024U
+#define BLACKBOX_BLOCK 1024U ///< Size of a block in bytes.
 /// Blocks per second: 11 of them hold 617 telemetry frames, 100 setpoints and 50 commands with their steps; the others
 /// are for frames of other nodes. On a fuller bus the ring covers a shorter time, and reports it.
 #define BLACKBOX_BLOCKS_PER_S 20U
 /// Smallest ring.
 #define BLACKBOX_BLOCKS_MIN 8U
 
+/// A block of packed entries.
 typedef struct {
-    uint64_t first; ///< Number of its first entry.
-    uint64_t at_us; ///< Time of that entry. Times in the block are relative to it.
-    uint8_t packed[BLACKBOX_BLOCK - 16U];
+    uint64_t first;                       ///< Number of its first entry.
+    uint64_t at_us;                       ///< Time of that entry. Times in the block are relative to it.
+    uint8_t packed[BLACKBOX_BLOCK - 16U]; ///< The entries, one after the other.
 } blackbox_block_t;
 IW_STATIC_ASSERT(sizeof(blackbox_block_t) == BLACKBOX_BLOCK, blocks_have_no_gaps);
 
+/// The ring, at the beginning of its memory. The memory belongs to the caller and may be shared between processes.
 typedef struct {
     atomic_uint_least64_t written; ///< Entries since the start: the number of the next one.
     atomic_uint_least64_t used;    ///< Bytes of blocks since the start, including heads and ends.
-    uint64_t blocks;
-    uint64_t last_us;    ///< Time of the last entry, for the writer only.
-    atomic_bool sending; ///< Setpoints are sent: if the gateway dies now, that is a stop to record.
-    blackbox_block_t block[];
+    uint64_t blocks;               ///< Number of blocks in the ring.
+    uint64_t last_us;              ///< Time of the last entry, for the writer only.
+    atomic_bool sending;           ///< Setpoints are sent: if the gateway dies now, that is a stop to record.
+    blackbox_block_t block[];      ///< The blocks.
 } blackbox_ring_t;
 
+/// Returns the size of the memory in bytes for a ring of this duration.
 size_t blackbox_ring_size(uint32_t seconds);
 
 /// Initializes the ring. `memory` has blackbox_ring_size(seconds) bytes, aligned for uint64_t.
 void blackbox_ring_init(blackbox_ring_t *self, uint32_t seconds);
 
-/// Adds an entry. It stores as many data bytes of a frame as the frame's length states, at most 8.
+/// Adds an entry; overwrites the oldest block if the ring is full. Only one thread of one process may call it. It
+/// stores as many data bytes of a frame as the frame's length states, at most 8.
 void blackbox_ring_put(blackbox_ring_t *self, const blackbox_entry_t *entry);
 
+/// Returns the number of entries since the start, including those that were overwritten. Any process may call it.
 uint64_t blackbox_ring_written(const blackbox_ring_t *self);
 
 /// Returns the largest number of entries that the ring can hold.

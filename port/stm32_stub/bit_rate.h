@@ -43,10 +43,10 @@
     (((BRD_BIT_SJW - 1U) << 24) | ((BRD_BIT_BS2 - 1U) << 20) | ((BRD_BIT_BS1 - 1U) << 16) | (BRD_BIT_PRESCALER - 1U))
 #endif
 
-static_assert(
-    BRD_APB1_HZ != 0U && BRD_APB1_HZ % 8000000U == 0U,
-    "this APB1 clock cannot give 1 Mbit/s sampled at exactly 62.5 %: change the board's clock tree so that APB1 is a "
-    "multiple of 8 MHz (8, 16, 24, 32, 40 or 48 MHz can; 36, 42, 45, 54 and 170 MHz cannot)");
+static_assert(BRD_APB1_HZ != 0U && BRD_APB1_HZ % 8000000U == 0U,
+              "this APB1 clock cannot produce 1 Mbit/s sampled at exactly 62.5 %: change the board's clock tree so "
+              "that APB1 is a "
+              "multiple of 8 MHz (8, 16, 24, 32, 40 or 48 MHz can; 36, 42, 45, 54 and 170 MHz cannot)");
 static_assert(BRD_BIT_PRESCALER <= 512U && BRD_BIT_BS1 <= BRD_BIT_BS1_MAX && BRD_BIT_BS2 <= BRD_BIT_BS2_MAX,
               "the controller has no such segments");
 static_assert(BRD_BIT_PRESCALER * BRD_BIT_QUANTA * IW_BUS_BITRATE_HZ == BRD_APB1_HZ, "not exactly 1 Mbit/s");

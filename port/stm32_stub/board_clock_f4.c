@@ -20,11 +20,12 @@
 #define DCEN          (1U << 10)
 #define PREFETCH      ((BRD_CAN_PREFETCH != 0) ? PRFTEN : 0U)
 
-static_assert(BRD_CRYSTAL_HZ >= BRD_CRYSTAL_MIN_HZ && BRD_CRYSTAL_HZ <= BRD_CRYSTAL_MAX_HZ &&
-                  BRD_PLL_INPUT_HZ * BRD_PLL_M == BRD_CRYSTAL_HZ,
-              "this crystal cannot give the bus exactly: 1 to 2 MHz that divide it and 320 MHz must go into the PLL "
-              "(7.3.2). Take any "
-              "whole MHz from 4 to 26, or 12.5 or 19.2 MHz (-DIWHEEL_CRYSTAL_HZ=25000000)");
+static_assert(
+    BRD_CRYSTAL_HZ >= BRD_CRYSTAL_MIN_HZ && BRD_CRYSTAL_HZ <= BRD_CRYSTAL_MAX_HZ &&
+        BRD_PLL_INPUT_HZ * BRD_PLL_M == BRD_CRYSTAL_HZ,
+    "this crystal cannot produce the bit rate exactly: 1 to 2 MHz that divide it and 320 MHz must go into the PLL "
+    "(7.3.2). Use any "
+    "whole MHz from 4 to 26, or 12.5 or 19.2 MHz (-DIWHEEL_CRYSTAL_HZ=25000000)");
 static_assert(BRD_PLL_M >= 2U && BRD_PLL_M <= 63U && BRD_PLL_N >= 50U && BRD_PLL_N <= 432U, "7.3.2");
 static_assert(BRD_PLL_INPUT_HZ * BRD_PLL_N / BRD_PLL_P == BRD_CORE_HZ, "the PLL's output");
 static_assert(BRD_CORE_HZ <= 168000000U, "faster needs overdrive, and an F407 cannot");

@@ -20,10 +20,11 @@
 #define ICEN        (1U << 9)
 #define DCEN        (1U << 10)
 
-static_assert(BRD_CRYSTAL_HZ >= BRD_CRYSTAL_MIN_HZ && BRD_CRYSTAL_HZ <= BRD_CRYSTAL_MAX_HZ &&
-                  BRD_PLL_INPUT_HZ * BRD_PLL_M == BRD_CRYSTAL_HZ,
-              "this crystal cannot give the bus exactly: 4 or 5 MHz that divide it must go into the PLL (7.4). Take a "
-              "multiple of 4 or 5 MHz from 4 to 48 (-DIWHEEL_CRYSTAL_HZ=24000000)");
+static_assert(
+    BRD_CRYSTAL_HZ >= BRD_CRYSTAL_MIN_HZ && BRD_CRYSTAL_HZ <= BRD_CRYSTAL_MAX_HZ &&
+        BRD_PLL_INPUT_HZ * BRD_PLL_M == BRD_CRYSTAL_HZ,
+    "this crystal cannot produce the bit rate exactly: 4 or 5 MHz that divide it must go into the PLL (7.4). Use a "
+    "multiple of 4 or 5 MHz from 4 to 48 (-DIWHEEL_CRYSTAL_HZ=24000000)");
 static_assert(BRD_PLL_M >= 1U && BRD_PLL_M <= 16U && BRD_PLL_N >= 8U && BRD_PLL_N <= 127U, "7.4");
 static_assert(BRD_PLL_INPUT_HZ * BRD_PLL_N / BRD_PLL_R == BRD_CORE_HZ && BRD_PLL_R == 4U, "the PLL's output");
 static_assert(BRD_CORE_HZ <= 150000000U, "faster needs the boost mode (6.1)");

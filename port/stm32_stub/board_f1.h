@@ -14,8 +14,8 @@
 #define BRD_CRYSTAL_MIN_HZ 4000000U ///< Data sheet, 5.3.6.
 #define BRD_CRYSTAL_MAX_HZ (BRD_CRYSTAL_IS_CLOCK != 0 ? 25000000U : 16000000U)
 #define BRD_INTERNAL_HZ    8000000U ///< Oscillator that runs after reset; too inaccurate for the bus.
-/// 64 MHz if this is a multiple of the crystal, otherwise 48 MHz. The usual 72 MHz gives 36 MHz on APB1, from which the
-/// exact bit rate cannot be derived.
+/// 64 MHz if this is a multiple of the crystal, otherwise 48 MHz. The usual 72 MHz results in 36 MHz on APB1, from
+/// which the exact bit rate cannot be derived.
 #define BRD_CORE_HZ        ((64000000U % BRD_CRYSTAL_HZ == 0U) ? 64000000U : 48000000U)
 #define BRD_PLL_MULTIPLIER (BRD_CORE_HZ / BRD_CRYSTAL_HZ)
 #ifndef BRD_APB1_HZ

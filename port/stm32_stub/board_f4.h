@@ -24,7 +24,7 @@
                                          : 1000000U)
 #define BRD_PLL_M   (BRD_CRYSTAL_HZ / BRD_PLL_INPUT_HZ)
 #define BRD_PLL_N   (320000000U / BRD_PLL_INPUT_HZ) ///< The PLL runs at 320 MHz.
-#define BRD_PLL_P   2U ///< Output: 160 MHz. The usual 168 and 180 MHz cannot give the exact bit rate.
+#define BRD_PLL_P   2U ///< Output: 160 MHz. The usual 168 and 180 MHz cannot produce the exact bit rate.
 #define BRD_PLL_Q   7U ///< 45.7 MHz for USB, which is not used; at most 48 MHz.
 #define BRD_CORE_HZ 160000000U
 #ifndef BRD_APB1_HZ

@@ -7,7 +7,7 @@
 
 __attribute__((section(".noinit"))) static volatile uint32_t count, inverse;
 
-/// Maps different values to different results, so that two counts never give the same id. The constants are those of
+/// Maps different values to different results, so that two counts never have the same id. The constants are those of
 /// the splitmix64 mixer.
 static uint64_t mix(uint64_t value) {
     value = (value ^ value >> 30) * 0xBF58476D1CE4E5B9U;

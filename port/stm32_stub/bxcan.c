@@ -11,8 +11,8 @@
 #define EMPTY      (BRD_TSR_TME(0) | BRD_TSR_TME(1) | BRD_TSR_TME(2))
 
 /// Writes MCR (bxCAN 9.2). These bits stay zero: NART (the controller repeats an unacknowledged frame until it is
-/// aborted), TXFP (the lowest id is sent first, so left before right), RFLM (a full FIFO keeps the newest frame), ABOM
-/// (the driver itself ends bus-off) and SLEEP.
+/// aborted), TXFP (the lowest id is sent first, so left before right), RFLM (a full FIFO retains the newest frame),
+/// ABOM (the driver itself ends bus-off) and SLEEP.
 static void write_mcr(const brd_bxcan_t *self, uint32_t request) {
     brd_register_write(&self->config.registers->MCR, BRD_MCR_DBF | request);
 }

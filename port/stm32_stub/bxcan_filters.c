@@ -9,7 +9,7 @@
 #define WIDE_BANKS   BRD_CAN_GROUPS
 #define NARROW_BANKS (BRD_CAN_GROUPS / 2U)
 
-static_assert(NARROW_BANKS + WIDE_BANKS == BRD_BXCAN_BANKS, "the header tells how many banks are taken");
+static_assert(NARROW_BANKS + WIDE_BANKS == BRD_BXCAN_BANKS, "the header states how many banks are in use");
 
 /// 16-bit scale (bxCAN 7.4): mask in the upper half, id in the lower half, each STID[15:5] RTR[4] IDE[3] EXID[2:0]. IDE
 /// must be 0.

@@ -2,7 +2,7 @@
 /// Bus controller of the board: the one interface of this port for bxCAN (can_bxcan.c, bxcan.c) and FDCAN
 /// (can_fdcan.c, fdcan.c). The build links one of them.
 ///
-/// The core sees no difference. The controllers differ in what they can take back, and in a few details:
+/// The core sees no difference. The controllers differ in the frames that they can purge, and in a few details:
 ///
 /// |                           | bxCAN                                   | FDCAN                              |
 /// |---------------------------|-----------------------------------------|------------------------------------|
@@ -17,7 +17,7 @@
 /// | a full receive FIFO       | loses an older frame                    | loses the new frame                |
 /// | an FD frame of others     | is destroyed by an error frame          | is ignored, counted and reported   |
 ///
-/// Neither has a queue behind the three buffers, so nothing else must be taken back.
+/// Neither has a queue behind the three buffers, so nothing else must be purged.
 #ifndef BRD_CAN_H
 #define BRD_CAN_H
 

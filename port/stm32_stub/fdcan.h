@@ -20,8 +20,8 @@
 /// node causes a protocol exception: the controller waits for the end of that frame and does not destroy it (CCCR.PXHD
 /// is 0). The driver counts the exceptions and reports them like losses, because the frame cannot be received.
 ///
-/// **Losses.** The driver counts each frame that finds the controller's FIFO or the ring full. The FIFO keeps the older
-/// frames. Before the next frames `receive` returns one report: a frame with the id IW_CAN_ERROR.
+/// **Losses.** The driver counts each frame that finds the controller's FIFO or the ring full. The FIFO retains the
+/// older frames. Before the next frames `receive` returns one report: a frame with the id IW_CAN_ERROR.
 ///
 /// Instances share no state, but a reset of one controller resets all of them: the chip has one bit for all. The main
 /// loop calls all functions except the handler.

@@ -17,7 +17,7 @@ void brd_fdcan_filters_write(brd_fdcan_registers_t *device, brd_fdcan_ram_t *ram
         brd_register_write(&ram->extended_filter[i][0], EXTENDED_0(group->id));
         brd_register_write(&ram->extended_filter[i][1], EXTENDED_1(BRD_ELEMENT_ID & ~varying));
     }
-    // A full FIFO keeps the frames that it has (F0OM is 0), and no filter for remote frames rejects them (RRFE, RRFS).
+    // A full FIFO retains its frames (F0OM is 0), and no filter for remote frames rejects them (RRFE, RRFS).
     brd_register_write(&device->RXGFC,
                        BRD_RXGFC_REJECT | (BRD_CAN_GROUPS << BRD_RXGFC_LSS) | (BRD_CAN_GROUPS << BRD_RXGFC_LSE));
 }

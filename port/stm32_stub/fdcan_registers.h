@@ -42,7 +42,7 @@ static_assert(offsetof(brd_fdcan_registers_t, CKDIV) == 0x100, "CKDIV is at 0x10
 #define BRD_FDCAN_BUFFERS 3U
 #define BRD_FDCAN_DEPTH   3U ///< Of a receive FIFO.
 
-/// Element of a receive FIFO or a transmit buffer (44.3): header, length, and room for the 64 bytes of an FD frame.
+/// Element of a receive FIFO or a transmit buffer (44.3): header, length, and space for the 64 bytes of an FD frame.
 typedef struct {
     brd_register_t id, control, data[16];
 } brd_fdcan_element_t;
@@ -81,7 +81,7 @@ static_assert(sizeof(brd_fdcan_ram_t) == 0x350, "the next controller's RAM follo
 #define BRD_IR_TCF  0x00000100U ///< A cancellation of a buffer of TXBCIE has finished.
 #define BRD_IR_EP   0x00020000U ///< PSR.EP has changed.
 #define BRD_IR_BO   0x00080000U ///< PSR.BO has changed.
-#define BRD_ILE_0   0x00000001U ///< Enables interrupt line 0, which has all interrupts unless ILS says otherwise.
+#define BRD_ILE_0   0x00000001U ///< Enables interrupt line 0, which has all interrupts unless ILS selects another line.
 
 #define BRD_RXGFC_REJECT 0x0000003CU ///< ANFE and ANFS: frames that no filter selects are rejected.
 #define BRD_RXGFC_LSS    16U         ///< Position of the number of filters for 11-bit ids.

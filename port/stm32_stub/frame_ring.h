@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 /// Queue of frames from interrupts to the main loop.
 ///
-/// It has one producer and one consumer: interrupts of equal priority put frames in, the main loop takes them out. It
+/// It has one producer and one consumer: interrupts of equal priority add frames, the main loop removes them. It
 /// needs no lock, because only one side writes each index. At most 21 frames arrive per millisecond at 1 Mbit/s, so the
-/// ring has room for 3 ms of a full bus.
+/// ring has space for 3 ms of a full bus.
 #ifndef BRD_FRAME_RING_H
 #define BRD_FRAME_RING_H
 
@@ -18,7 +18,7 @@ typedef struct {
     iw_can_frame_t frame[BRD_FRAME_RING_LENGTH];
     uint8_t tag[BRD_FRAME_RING_LENGTH]; ///< Tag of the producer, returned with the frame.
     atomic_uint head;                   ///< Number of frames put in since the start; written by the producer.
-    atomic_uint tail;                   ///< Number of frames taken out since the start; written by the consumer.
+    atomic_uint tail;                   ///< Number of frames removed since the start; written by the consumer.
 } brd_frame_ring_t;
 
 /// Call it from an interrupt. Returns false if the ring is full: the frame is lost, and the caller must count it.

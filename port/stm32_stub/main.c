@@ -95,8 +95,8 @@ int main(void) {
     brd_estop_init();
     brd_irq_enable(BRD_IRQ_EXTI0);
     const iw_config_t config = configuration();
-    // The acknowledgement of an image that only listens would look like that of a wheel, and would confirm frames of
-    // another master that no wheel has received.
+    // An image that only listens must not acknowledge: another master would count frames as received that no wheel has
+    // received.
     brd_can_start(!brd_commander_sends());
     if (!start_gateway(&gateway, &config, restarted)) {
         return 1;

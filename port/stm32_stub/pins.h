@@ -9,7 +9,7 @@
 #include <assert.h>
 
 static_assert(BRD_ESTOP % 16U == 0U,
-              "the e-stop's interrupt is EXTI line 0: take pin 0 of a port (PA0, PB0, PC0 or PD0)");
+              "the e-stop's interrupt is EXTI line 0: use pin 0 of a port (PA0, PB0, PC0 or PD0)");
 
 /// Enables the clocks of the ports, the bus controller and the serial port, sets pull-ups and functions, and connects
 /// EXTI line 0 to the pin of the e-stop. It works with any clock.

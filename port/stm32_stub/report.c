@@ -70,7 +70,7 @@ static void tell_state(const iw_snapshot_t *seen, bool estop_pressed) {
     brd_console_text(iwn_bus_state_name(seen->bus));
     brd_console_text(estop_pressed ? "; e-stop pressed" : "; e-stop released");
     if (state == IW_STATE_LATCHED) {
-        brd_console_text("; to reset: mend the cause, release the e-stop, then press the button on");
+        brd_console_text("; to reset: fix the cause, release the e-stop, then press the button on");
         pin(BRD_BUTTON);
     }
     brd_console_text("\r\n");
@@ -102,11 +102,11 @@ void brd_report_reset(iw_refusal_t refusal) {
         [IW_REFUSE_LATCHED] = "still latched",
         [IW_REFUSE_ESTOP_PRESSED] = "refused: the e-stop is pressed",
         [IW_REFUSE_BUS_DOWN] = "refused: the bus is down",
-        [IW_REFUSE_WHEEL_LOST] = "refused: a wheel is not heard; give it power",
+        [IW_REFUSE_WHEEL_LOST] = "refused: a wheel is offline; switch it on",
         [IW_REFUSE_NOT_AT_REST] = "refused: a wheel still turns",
-        [IW_REFUSE_SECOND_MASTER] = "refused: somebody else sends setpoints",
-        [IW_REFUSE_CAUSE_PRESENT] = "refused: its cause was there within the last second",
-        [IW_REFUSE_STALE_COMMAND] = "refused: a command that moves is still being given",
+        [IW_REFUSE_SECOND_MASTER] = "refused: another node sends setpoints",
+        [IW_REFUSE_CAUSE_PRESENT] = "refused: its cause was present less than a second ago",
+        [IW_REFUSE_STALE_COMMAND] = "refused: a client still sends nonzero commands",
     };
     const char *const found = ((size_t)refusal < sizeof words / sizeof words[0]) ? words[refusal] : NULL;
     brd_console_text("reset ");

@@ -4,7 +4,7 @@
 ///
 ///     iwheel 0.3.0 on STM32F103 (Blue Pill): clock 64 MHz from a crystal of 8000 kHz; CAN on PB8 PB9 at 1000000 bit/s,
 ///     sampled at 62.5 %, BTR 0x03590001; e-stop on PB0: released; holds both wheels at zero
-///     latched by send_stalled; bus active; e-stop released; to reset: mend the cause, release the e-stop, then press
+///     latched by send_stalled; bus active; e-stop released; to reset: fix the cause, release the e-stop, then press
 ///     the button on PA1
 #ifndef BRD_REPORT_H
 #define BRD_REPORT_H

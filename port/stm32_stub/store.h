@@ -31,8 +31,8 @@ void brd_store_open(brd_store_t *self);
 /// Reads the payload of the newest record. Returns false and leaves `out_payload` unchanged if there is none.
 bool brd_store_read(const brd_store_t *self, uint32_t out_payload[BRD_STORE_WORDS]);
 
-/// Writes a record. Returns false if the flash fails or no slot is blank. With `may_erase` the call makes room by an
-/// erase if necessary, which may take seconds: set it only before the watchdog runs and while nothing is being sent.
+/// Writes a record. Returns false if the flash fails or no slot is blank. With `may_erase` the call erases a
+/// page if necessary, which may take seconds: set it only before the watchdog runs and while nothing is being sent.
 bool brd_store_write(brd_store_t *self, const uint32_t payload[BRD_STORE_WORDS], bool may_erase);
 
 /// Returns the number of blank slots in the page of the newest record.

@@ -28,7 +28,7 @@ typedef struct {
 #define BRD_USART2 ((brd_usart_t *)0x40004400U)
 
 /// Clears a pause and errors after a read of SR. Without ICR this reads the data register; the DMA has already fetched
-/// the byte in it, or the byte is damaged. With ICR a read could take a byte from the DMA.
+/// the byte in it, or the byte is damaged. With ICR a read could remove a byte before the DMA reads it.
 static inline void brd_usart_clear(void) {
 #ifdef BRD_USART_HAS_ICR
     BRD_USART2->ICR = 0x1FU; // Parity, framing, noise, overrun, pause.

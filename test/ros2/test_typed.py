@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Every row of the table "What a user types" of the page for ROS 2, with a real ROS 2 and simulated wheels."""
+"""Every row of the table "Commands and their results" of the page for ROS 2, with a real ROS 2 and simulated wheels."""
 
 import math
 import os
@@ -22,8 +22,8 @@ STAND_IN = "typed.py"  # Only this program prints when it sent the request.
 
 def rows():
     """{typed command: expected results} of the page."""
-    (page,) = [path for path in Path(ROOT, "docs").rglob("ros2.md") if "| What a user types |" in path.read_text(encoding="utf-8")]
-    table = page.read_text(encoding="utf-8").split("| What a user types |", 1)[1].split("\n\n", 1)[0]
+    (page,) = [path for path in Path(ROOT, "docs").rglob("ros2.md") if "| command | result |" in path.read_text(encoding="utf-8")]
+    table = page.read_text(encoding="utf-8").split("| command | result |", 1)[1].split("\n\n", 1)[0]
     return dict(re.findall(r"^\| `([^`]+)` \| (.+) \|$", table, re.MULTILINE))
 
 

@@ -29,9 +29,9 @@ REFUSALS = {  # Options, and the text that the message must contain.
     "-DIWHEEL_SETPOINT_TYPE=256 -DIWHEEL_CURRENT_ROLE=limit": "number from 0 to 255",
     "-DIWHEEL_SETPOINT_TYPE=one -DIWHEEL_CURRENT_ROLE=limit": "number from 0 to 255",
     "-DIWHEEL_SETPOINT_TYPE=1 -DIWHEEL_CURRENT_ROLE=torque": "must be limit or setpoint",
-    "-DIWHEEL_SETPOINT_TYPE=1": "Give both",
-    "-DIWHEEL_CURRENT_ROLE=limit": "Give both",
-    "-DIWHEEL_SETPOINT_TYPE=1 -DIWHEEL_CURRENT_ROLE=limit": "Give IWHEEL_TRACK_MM too",
+    "-DIWHEEL_SETPOINT_TYPE=1": "Set both",
+    "-DIWHEEL_CURRENT_ROLE=limit": "Set both",
+    "-DIWHEEL_SETPOINT_TYPE=1 -DIWHEEL_CURRENT_ROLE=limit": "Set IWHEEL_TRACK_MM too",
     "-DIWHEEL_GATEWAY=ON -DIWHEEL_TRACK_MM=199": "number from 200 to 1500",
     "-DIWHEEL_GATEWAY=ON -DIWHEEL_TRACK_MM=1501": "number from 200 to 1500",
     "-DIWHEEL_DEMO=ON": "IWHEEL_DEMO needs",
@@ -92,7 +92,7 @@ def test_crystal_compiles(board, mhz):
 @pytest.mark.parametrize(("board", "mhz"), [(board, mhz) for board, several in CRYSTALS_THAT_CANNOT.items() for mhz in several])
 def test_crystal_without_exact_bus_rate_does_not_compile(board, mhz):
     done = clock_tree(board, mhz)
-    assert done.returncode != 0 and "this crystal cannot give the bus exactly" in done.stderr
+    assert done.returncode != 0 and "this crystal cannot produce the bit rate exactly" in done.stderr
 
 
 @pytest.mark.parametrize(("board", "mhz"), [("stm32f103", 36), ("stm32f407", 42), ("stm32f446", 45), ("stm32g474", 170)])

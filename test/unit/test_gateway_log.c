@@ -57,8 +57,8 @@ TEST(test_log_at_start_names_bus_sockets_estop_and_stop_budget) {
     (void)snprintf(line, sizeof line, "stop budget, gateway killed: %u ms and %u mm at full command, then unknown\n",
                    (unsigned)budget.killed_ms, (unsigned)budget.killed_mm);
     assert_line(line);
-    assert_line(
-        "angle budget, zero at once: a wheel blocked 16.2 degrees, slow 18.3, at 4700 mm/s2 assumed, not measured\n");
+    assert_line("angle budget, zero without ramp: a wheel blocked 16.2 degrees, slow 18.3, at 4700 mm/s2 assumed, not "
+                "measured\n");
     assert_line("angle budget, ramp: a wheel coasting 40.4 degrees, at 700 mm/s2 assumed, not measured; late by 100 ms "
                 "10.6\n");
     assert_line(

@@ -30,10 +30,10 @@ static const char *sentence(iw_cause_t cause, uint8_t sides, uint32_t detail) {
 }
 
 TEST(test_why_names_cause_numbers_time_and_fix) {
-    TEST_ASSERT_EQUAL_STRING(
-        "left wheel sent no telemetry for 53 ms while driving 300/-299 mm/s; zero at once, latched at 12.345 s; "
-        "check the wheel's power and cable, then: iwheelctl reset",
-        sentence(IW_CAUSE_WHEEL_LOST, IW_SIDES_LEFT, 53));
+    TEST_ASSERT_EQUAL_STRING("left wheel sent no telemetry for 53 ms while driving 300/-299 mm/s; set to zero "
+                             "immediately, latched at 12.345 s; "
+                             "check the wheel's power and cable, then: iwheelctl reset",
+                             sentence(IW_CAUSE_WHEEL_LOST, IW_SIDES_LEFT, 53));
     TEST_ASSERT_NOT_NULL(
         strstr(sentence(IW_CAUSE_WHEEL_LOST, IW_SIDES_BOTH, UINT32_MAX), "both wheels never sent telemetry"));
     TEST_ASSERT_NOT_NULL(strstr(sentence(IW_CAUSE_SECOND_MASTER, 0, 266), "id 266 (0x10A)"));
@@ -66,7 +66,7 @@ TEST(test_why_reports_for_each_stop_whether_it_ramped) {
     TEST_ASSERT_NOT_NULL(strstr(text, "; ramped to zero at"));
     stop.at_once = true;
     iwn_why_sentence(&stop, &context, text, sizeof text);
-    TEST_ASSERT_NOT_NULL(strstr(text, "; zero at once at"));
+    TEST_ASSERT_NOT_NULL(strstr(text, "; set to zero immediately at"));
 }
 
 TEST(test_why_after_a_crash_has_no_unknown_values) {
@@ -77,9 +77,10 @@ TEST(test_why_after_a_crash_has_no_unknown_values) {
     stop.cause = IW_CAUSE_RESTART;
     stop.at_once = true;
     iwn_why_sentence(&stop, &context, text, sizeof text);
-    TEST_ASSERT_EQUAL_STRING("the gateway before this one died while the wheels were armed; zero at once at 0.000 s; "
-                             "find the crash in the log, then arm again",
-                             text);
+    TEST_ASSERT_EQUAL_STRING(
+        "the gateway before this one died while the wheels were armed; set to zero immediately at 0.000 s; "
+        "find the crash in the log, then arm again",
+        text);
 }
 
 TEST(test_why_has_a_sentence_and_a_name_for_every_cause) {

@@ -984,7 +984,7 @@ def test_check_refuses_a_token_that_the_start_refuses(rig):
 
     token.unlink(missing_ok=True)
     assert check()[0] == 0 and not token.exists(), "the start makes one"
-    for text, mode, about in (("a" * 32, 0o644, "others may read"), ("short", 0o600, "holds no token"), ("a" * 32, 0o600, None)):
+    for text, mode, about in (("a" * 32, 0o644, "others may read"), ("short", 0o600, "contains no token"), ("a" * 32, 0o600, None)):
         token.write_text(text + "\n", encoding="ascii")
         os.chmod(token, mode)
         code, words = check()

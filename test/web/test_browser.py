@@ -420,7 +420,7 @@ def fleet_row(name, **other):
 
 def write_fleet(rig, age_s=0.0):
     now_us = int((time.time() - age_s) * 1e6)
-    sentence = "left wheel sent no telemetry for 204 ms while driving 300/300 mm/s; zero at once, latched at 16203.231 s; check the wheel's power and cable, then: iwheelctl reset"
+    sentence = "left wheel sent no telemetry for 204 ms while driving 300/300 mm/s; set to zero immediately, latched at 16203.231 s; check the wheel's power and cable, then: iwheelctl reset"
     rows = [
         fleet_row("walker-1"),
         fleet_row(

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-/// Waiting room for new connections until they send something. A connection that sends nothing costs only a descriptor
-/// and keeps no other client out.
+/// List of new connections that have not sent anything yet. A connection that sends nothing uses only a descriptor and
+/// does not block other clients.
 ///
-/// Each connection has WEB_DOOR_GRACE_US to send. After that time the oldest one is closed when the room is full. Until
+/// Each connection has WEB_DOOR_GRACE_US to send. After that time the oldest one is closed when the list is full. Until
 /// then new connections wait in the queue of the kernel, so at least WEB_DOOR_MAX are accepted per grace time.
 #ifndef WEB_DOOR_H
 #define WEB_DOOR_H
@@ -13,7 +13,7 @@
 #define WEB_DOOR_LISTENERS 2U
 #define WEB_DOOR_MAX       256U
 #define WEB_DOOR_GRACE_US  50000U
-/// A connection that sends nothing for this time is closed, even if there is room.
+/// A connection that sends nothing for this time is closed, even if the list is not full.
 #define WEB_DOOR_US 5000000U
 
 typedef struct {
@@ -25,23 +25,25 @@ typedef struct {
     int listen_fds[WEB_DOOR_LISTENERS]; ///< -1: none.
     int epoll_fd;                       ///< For poll(): a waiting connection has sent something or has closed.
     unsigned count;
-    uint64_t crowded_out;             ///< Connections that were closed to make room.
+    uint64_t crowded_out;             ///< Connections that were closed for newer ones.
     web_guest_t guests[WEB_DOOR_MAX]; ///< Oldest first.
 } web_door_t;
 
-/// Takes over listening sockets that do not block (-1: none). Returns false with errno and closes them if there is no
-/// epoll descriptor.
+/// Owns these listening sockets from now on, which do not block (-1: none). Returns false with errno and closes them if
+/// there is no epoll descriptor.
 bool web_door_open(web_door_t *self, const int listen_fds[WEB_DOOR_LISTENERS]);
+
+/// Closes the listening sockets and all connections of the list.
 void web_door_close(web_door_t *self);
 
-/// Accepts new connections if there is room, and closes those whose time is over.
+/// Accepts new connections while the list is not full, and closes those whose time is over.
 void web_door_step(web_door_t *self, uint64_t now_us);
 
 /// Removes a connection that has sent something or has closed, and passes its descriptor to the caller. Returns -1 if
 /// there is none.
 int web_door_take(web_door_t *self);
 
-/// Returns the descriptor for poll() of this listening socket; -1 if the room is full.
+/// Returns the descriptor for poll() of this listening socket; -1 if the list is full.
 int web_door_fd(const web_door_t *self, unsigned listener, uint64_t now_us);
 
 /// Returns the time of the next work of `step` without input.

@@ -26,13 +26,13 @@ bool web_command_moves(const web_command_t *command) {
 const char *web_age_wrong(const char *t_us, uint64_t now_us, int64_t *out_t_us) {
     int64_t since_us = 0;
     if (!web_number(t_us, 0, INT64_MAX, &since_us)) {
-        return "it does not say since when it is wanted: quote boot of /api/challenge, and t_us of the newest state";
+        return "it has no time: add boot of /api/challenge, and t_us of the newest state";
     }
     if ((uint64_t)since_us > now_us + WEB_AHEAD_US) {
-        return "its t_us is in the future; quote t_us of the newest state";
+        return "its t_us is in the future; use t_us of the newest state";
     }
     if ((uint64_t)since_us < now_us && now_us - (uint64_t)since_us > WEB_AGE_US) {
-        return "it was on its way for more than a second; ask again";
+        return "it is older than a second; send it again";
     }
     *out_t_us = since_us;
     return NULL;
@@ -49,10 +49,10 @@ static const char *judge(const web_driver_t *self, const web_command_t *command,
         return "a command needs t_us and sequence";
     }
     if (sequence <= self->sequence) {
-        return "a newer command was here already";
+        return "a newer command has already arrived";
     }
     if ((uint64_t)told_us > now_us + WEB_AHEAD_US) {
-        return "its t_us is in the future; quote t_us of the newest state";
+        return "its t_us is in the future; use t_us of the newest state";
     }
     if ((uint64_t)told_us < now_us && now_us - (uint64_t)told_us > limits->ttl_us) {
         return "too old: the connection is too slow for driving";

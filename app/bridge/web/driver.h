@@ -23,7 +23,7 @@
 typedef struct {
     bool is_driven;
     int64_t sequence;   ///< Sequence of the last accepted command.
-    uint64_t silent_us; ///< Time at which the page counts as silent.
+    uint64_t silent_us; ///< End of the drive, unless the page sends a command before.
     uint64_t dropped;   ///< Dropped commands since the start of the bridge.
 } web_driver_t;
 

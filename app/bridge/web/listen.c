@@ -180,7 +180,7 @@ static int take_passed(const web_settings_t *settings, unsigned count, int out_f
     if (found != count || (found != needed && !(found == 1U && out_fds[0] >= 0 && lacks_v6(settings)))) {
         errno = 0;
         return complain(
-            "iwheel-web.socket listens elsewhere than listen and port of web.conf say",
+            "iwheel-web.socket listens elsewhere: its addresses differ from listen and port in web.conf",
             "systemctl edit iwheel-web.socket (docs/user/web.md), then: systemctl restart iwheel-web.socket");
     }
     return 0;

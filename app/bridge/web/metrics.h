@@ -13,7 +13,7 @@ typedef struct {
     uint64_t refused;     ///< Refused requests since the start of the bridge.
     uint64_t dropped;     ///< Dropped drive commands since the start.
     uint64_t connections; ///< Connections to the gateway since the start.
-    uint64_t crowded_out; ///< Connections that were closed to make room, since the start.
+    uint64_t crowded_out; ///< Connections that were closed for newer ones, since the start.
 } web_own_t;
 
 /// `state`: the event `state`; NULL: the gateway is away, so only this and the metrics of the bridge are written.

@@ -51,7 +51,7 @@ static web_session_t *find(web_proofs_t *self, const char *id) {
     return NULL;
 }
 
-/// Returns a place for a new session. A session whose first nonce may still be valid keeps its place, because its first
+/// Returns a place for a new session. A session whose first nonce may still be valid is not replaced, because its first
 /// request could otherwise be repeated.
 static web_session_t *find_place(web_proofs_t *self, uint64_t now_us) {
     web_session_t *oldest = &self->sessions[0];

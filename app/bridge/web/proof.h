@@ -9,9 +9,9 @@
 ///     MAC = HMAC-SHA-256(token, METHOD "\n" TARGET "\n" SESSION "\n" NONCE "\n" SEQUENCE), 64 digits
 ///
 /// with a SEQUENCE that counts from 1 in each session (the last 64 may arrive in any order, each once). A session
-/// begins with a nonce that is younger than 20 s, and keeps that nonce. For programs that only read there is a second
-/// secret, derived from the token, which is sent as `Bearer`: a client with it may read, but cannot drive, reset or
-/// arm.
+/// begins with a nonce that is younger than 20 s, and uses that nonce until it ends. For programs that only read there
+/// is a second secret, derived from the token, which is sent as `Bearer`: a client with it may read, but cannot drive,
+/// reset or arm.
 ///
 /// Pure except for the HMAC of GnuTLS: no socket, no clock. Fixed memory.
 #ifndef WEB_PROOF_H

@@ -99,7 +99,7 @@ bool web_token_refresh(web_token_t *self, bool *out_changed, FILE *err) {
     if (!ours) {
         return complain(self, "others may read or write it; delete it, and the bridge makes a new one", err);
     }
-    return good || complain(self, "holds no token; delete it, and the bridge makes a new one", err);
+    return good || complain(self, "contains no token; delete it, and the bridge makes a new one", err);
 }
 
 bool web_token_judge(const web_token_t *self, FILE *err) {

@@ -51,7 +51,7 @@ static void take_answer(void *context, const iwc_message_t *reply) {
     web_call_resume(self);
 }
 
-/// Ends the wait of a suspended call if the gateway cannot be asked.
+/// Ends the wait of a suspended call if the request cannot be sent to the gateway.
 static enum MHD_Result went_out(web_call_t *self, bool asked) {
     static const char gone[] = "{\"ok\":false,\"error\":\"not_delivered\",\"message\":\"";
     char text[256];
@@ -182,7 +182,7 @@ static enum MHD_Result ask_reset(web_call_t *self) {
     const char *who = who_moves(self, NULL);
     if (why == NULL && (!web_number(web_call_argument(self, "stop"), 1, INT64_MAX, &stop) ||
                         (uint64_t)stop != self->server->link.stop_number)) {
-        why = "it does not name the stop that is in force; read why it stopped, then ask again";
+        why = "it does not name the last stop; read the cause of that stop, then send it again";
     }
     if (why != NULL) {
         return web_call_refuse(self, 409, "stale_command", why);

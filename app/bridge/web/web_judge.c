@@ -181,7 +181,8 @@ web_verdict_t web_judge(const web_rules_t *rules, const web_asked_t *asked) {
                       "this is not a name of this machine: use its address, or list the name under hosts");
     }
     if (!is_our_page(asked) && !is_navigation(route, asked)) {
-        return refuse(403, "bad_origin", "the page of another site asks: open the page of this bridge");
+        return refuse(403, "bad_origin",
+                      "the request comes from the page of another site; open the page of this bridge");
     }
     if (asked->is_doubled) {
         return refuse(400, "bad_header",

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// Judges whether a request may be answered, and which route it asks for. The bridge itself parses no other input of
+/// Judges whether a request may be answered, and finds its route. The bridge itself parses no other input of
 /// clients.
 ///
 /// Pure: no socket, no clock, no heap. Texts are terminated; NULL: not sent.

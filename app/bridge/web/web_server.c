@@ -71,7 +71,7 @@ static int read_certificate(web_server_t *self) {
     self->certificate = page_read_all(self->settings->web.certificate, &length);
     if (self->certificate == NULL) {
         return complain(EX_CONFIG, self->settings->web.certificate,
-                        "cannot be read; give a PEM file that the bridge's user may read");
+                        "cannot be read; set it to a PEM file that the bridge's user may read");
     }
     if (!is_secret(self->settings->web.key)) {
         return complain(
@@ -81,7 +81,7 @@ static int read_certificate(web_server_t *self) {
     self->key = page_read_all(self->settings->web.key, &length);
     return (self->key != NULL) ? 0
                                : complain(EX_CONFIG, self->settings->web.key,
-                                          "cannot be read; give a PEM file that the bridge's user may read");
+                                          "cannot be read; set it to a PEM file that the bridge's user may read");
 }
 
 /// Callback of the library at the start and the end of a connection.
@@ -179,7 +179,7 @@ int web_server_open(web_server_t *self, const web_settings_t *settings) {
     self->daemon = start(self);
     if (self->daemon == NULL) {
         return complain(EX_CONFIG, settings->web.certificate,
-                        "is no certificate that fits the key; give another pair of PEM files");
+                        "does not fit the key; set certificate and key to a pair of PEM files");
     }
     return web_listen_verify(settings, self->door.listen_fds);
 }
@@ -220,7 +220,7 @@ static void close_idle_peers(const web_server_t *self) {
 }
 
 /// Returns the number of connections to accept between two rounds of the library: their requests are then read before
-/// they could be closed to make room.
+/// they could be closed for newer ones.
 static unsigned newcomers_max(const web_server_t *self) {
     const unsigned quarter = self->settings->web.max_connections / 4U;
     return (quarter < NEWCOMERS_MAX) ? quarter : NEWCOMERS_MAX;
@@ -256,7 +256,7 @@ static unsigned count_peers(const web_server_t *self) {
     return count;
 }
 
-/// Passes connections that have sent something from the waiting room to the library.
+/// Passes connections that have sent something from the list of new ones to the library.
 static void let_in(web_server_t *self) {
     const unsigned newcomers = newcomers_max(self);
     unsigned count = count_peers(self);
@@ -290,7 +290,7 @@ static void look_at_token(web_server_t *self) {
     }
 }
 
-/// Ends driving and sends `stop` if the page that drives sends nothing: then no person holds the pad. A lease of
+/// Ends driving and sends `stop` if the page that drives sends nothing: then no person is using the pad. A lease of
 /// another client is not changed.
 static void let_go(web_server_t *self) {
     bridge_lease_t *lease = &self->link.lease;

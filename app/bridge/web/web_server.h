@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
 /// The whole bridge: HTTP on one side, the gateway on the other, in one thread that never waits for either.
 ///
-/// Bounded: connections, bytes of a request, time until a request is complete, questions to the gateway, stored events.
-/// A client with the token is served next to any number of others: these are closed to make room, the oldest first.
+/// Bounded: connections, bytes of a request, time until a request is complete, requests to the gateway, stored events.
+/// A client with the token is served next to any number of others: these are closed if there are too many, the oldest
+/// first.
 #ifndef WEB_SERVER_H
 #define WEB_SERVER_H
 
@@ -75,7 +76,7 @@ struct web_server {
     web_peer_t *peers; ///< Newest first.
     web_call_t *streams;
     unsigned stream_count;
-    uint64_t crowded_out; ///< Connections that were closed to make room.
+    uint64_t crowded_out; ///< Connections that were closed for newer ones.
     char *certificate;
     char *key;
     uint64_t now_us;

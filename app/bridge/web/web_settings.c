@@ -105,14 +105,15 @@ static void relate(settings_report_t *report, const void *values, const unsigned
     const bool certificate = web_settings_has_tls(settings);
     if (certificate != is_given(settings->web.key)) {
         settings_complain(report, line_of(certificate ? "certificate" : "key", lines),
-                          "%s is given without %s; give both files, or none", certificate ? "certificate" : "key",
+                          "%s is set without %s; set both files, or none", certificate ? "certificate" : "key",
                           certificate ? "key" : "certificate");
     }
     if (!certificate && !stays_on_this_machine(settings)) {
-        settings_complain(report, line_of("listen", lines),
-                          "listen = %s is reached from other machines, and without TLS everybody between reads the "
-                          "token; give certificate and key, or listen = 127.0.0.1",
-                          settings->web.listen);
+        settings_complain(
+            report, line_of("listen", lines),
+            "listen = %s can be reached from other machines, and without TLS any device between them can read the "
+            "token; set certificate and key, or listen = 127.0.0.1",
+            settings->web.listen);
     }
     if (settings->drive.allow_reset && !settings->drive.enabled) {
         settings_complain(report, line_of("allow_reset", lines),

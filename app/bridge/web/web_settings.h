@@ -16,7 +16,8 @@ typedef struct {
     struct {
         char listen[108]; ///< An address, or `unix:PATH`.
         uint32_t port;
-        char hosts[201]; ///< More names of the page, besides `listen` and localhost, separated by blanks; or none.
+        char hosts
+            [201]; ///< More names of the page, in addition to `listen` and localhost, separated by blanks; or none.
         char token_file[108];
         uint32_t token_hours; ///< Hours of validity; 0: no end.
         uint32_t max_connections;

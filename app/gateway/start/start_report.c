@@ -19,9 +19,10 @@ static void report_angles(const gateway_config_t *config, sock_log_t *log) {
         return;
     }
     const gw_angles_t angles = gw_angles(config);
-    sock_log(log, SOCK_LOG_INFO,
-             "angle budget, zero at once: a wheel blocked %u.%u degrees, slow %u.%u, at %u mm/s2 assumed, not measured",
-             TENTHS(angles.blocked), TENTHS(angles.slow), GW_ANGLES_BRAKE_MM_S2);
+    sock_log(
+        log, SOCK_LOG_INFO,
+        "angle budget, zero without ramp: a wheel blocked %u.%u degrees, slow %u.%u, at %u mm/s2 assumed, not measured",
+        TENTHS(angles.blocked), TENTHS(angles.slow), GW_ANGLES_BRAKE_MM_S2);
     sock_log(
         log, SOCK_LOG_INFO,
         "angle budget, ramp: a wheel coasting %u.%u degrees, at %u mm/s2 assumed, not measured; late by 100 ms %u.%u",

@@ -128,7 +128,7 @@ typedef struct {
 /// Setpoint message.
 typedef struct {
     int16_t speed_mm_s; ///< Speed as on the bus: positive is the wheel's own forward.
-    int16_t current_mA; ///< Current within +/- IW_CURRENT_LIMIT_mA.
+    int16_t current_mA; ///< Limit or setpoint. As decoded it may exceed IW_CURRENT_LIMIT_mA; the encoder clamps it.
     uint8_t type;       ///< Setpoint type. The document lists no values.
 } iw_codec_setpoint_t;
 
@@ -151,7 +151,8 @@ const iw_codec_row_t *iw_codec_find(uint32_t id);
 /// Returns the name of a message: "speed", "status", "force", "offset", "setpoint" or "pose". `kind` < IW_CODEC_KINDS.
 const char *iw_codec_name(iw_codec_kind_t kind);
 
-/// Returns the wheel of one of the eleven ids.
+/// Returns the wheel of one of the eleven ids: the sender of telemetry, the receiver of a setpoint. It does not check
+/// the id: for any other id the result has no meaning.
 iw_side_t iw_codec_side(uint32_t id);
 
 /// Decodes a frame into the values of its wheel and returns the kind of the message. If the frame is not a message, it
@@ -165,8 +166,9 @@ iw_codec_kind_t iw_codec_decode(const iw_can_frame_t *frame, iw_codec_wheel_t wh
 iw_status_t iw_codec_encode(iw_codec_kind_t kind, iw_side_t side, const iw_codec_wheel_t *wheel,
                             iw_can_frame_t *out_frame);
 
-/// Encodes a setpoint of `dlc` bytes (5..8), padded with zeros. Clamps the current to +/- IW_CURRENT_LIMIT_mA, which is
-/// the last check before the bus. Returns true if it clamped the current; the caller counts that.
+/// Encodes a setpoint of `dlc` bytes (5..8, not checked), with zeros in bytes 5 to 7 and kind IW_CAN_RECEIVED. Clamps
+/// the current to +/- IW_CURRENT_LIMIT_mA, which is the last check before the bus; does not limit the speed. Always
+/// writes `*out_frame`. Returns true if it clamped the current; the caller counts that.
 bool iw_codec_encode_setpoint(iw_side_t side, const iw_codec_setpoint_t *setpoint, uint8_t dlc,
                               iw_can_frame_t *out_frame);
 

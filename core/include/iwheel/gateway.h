@@ -115,35 +115,50 @@ void iw_gateway_suspended(iw_gateway_t *self, iw_time_us_t for_us);
 /// Sets the facts about the bus. The port calls it when they change.
 void iw_gateway_bus_facts(iw_gateway_t *self, const iw_bus_facts_t *facts);
 
-/// Requests ARMED for `client`. After IW_REFUSE_NONE the caller polls `iw_gateway_arming` after each step. When it is
-/// false, the state is ARMED and the client holds the lease, or `iw_gateway_arm_refusal` returns why not.
+/// Requests ARMED for `client`, which must not be IW_CLIENT_NONE. After IW_REFUSE_NONE the caller polls
+/// `iw_gateway_arming` after each step. When it is false, the state is ARMED and the client holds the lease, or
+/// `iw_gateway_arm_refusal` returns why not. That takes at most `echo_ms`. The first lease is IW_FIRST_LEASE_US long.
+/// Any other result changes nothing. `takeover`: while another client is armed, the lease moves to `client`
+/// immediately, but only with both wheels at standstill and a last pair of zero. If `client` holds the lease already or
+/// waits for it, the call returns IW_REFUSE_NONE and does not extend the lease; IW_REFUSE_CONTRADICTED is possible
+/// there too.
 iw_refusal_t iw_gateway_arm(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t client, bool takeover);
 
 /// Commands both wheels. Writes `*out_applied` only if it returns IW_REFUSE_NONE; a refused command changes neither
-/// wheel. `sent_us`: time at which the client sent the command, not later than now. The lease starts at that time. A
-/// command from before ARMED is refused as IW_REFUSE_STALE_COMMAND. The caller passes commands in the order of
-/// `sent_us`, because an older one shortens the lease.
+/// wheel and does not extend the lease. `sent_us`: time at which the client sent the command, not later than now. The
+/// lease starts at that time. A command from before ARMED is refused as IW_REFUSE_STALE_COMMAND. The caller passes
+/// commands in the order of `sent_us`, because an older one shortens the lease. After a nonzero command of any client,
+/// also a refused one, the core refuses arm and reset for IW_STALE_COMMAND_US.
 iw_refusal_t iw_gateway_drive(iw_gateway_t *self, iw_time_us_t sent_us, iw_client_t client, const iw_drive_t *request,
                               iw_applied_t *out_applied);
 
-/// Stops the wheels by a ramp. Any client may call it. `cause`: IW_CAUSE_CLIENT_STOP or IW_CAUSE_SHUTDOWN.
+/// Stops the wheels by a ramp and ends the lease, or ends an arming that waits. Any client may call it. In any other
+/// state it stops nothing. `cause`: IW_CAUSE_CLIENT_STOP, or IW_CAUSE_SHUTDOWN, which in every state also ends a hold.
 void iw_gateway_stop(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t client, iw_cause_t cause);
 
 /// Stops the wheels by zero without a ramp and enters LATCHED. Any client may call it.
 void iw_gateway_estop(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t client);
 
-/// Leaves LATCHED, or returns the reason why it must not.
+/// Leaves LATCHED for LISTENING, or for STOPPING while a hold (`iw_config_t::hold`) lasts. It does not arm. Returns
+/// IW_REFUSE_NONE, also if the state is not LATCHED; then nothing changes. It is refused, and the state stays LATCHED,
+/// while a latching cause is present or less than a second old (the refusal of that cause), while a wheel is offline
+/// (IW_REFUSE_WHEEL_LOST), while a wheel turns or the ramp continues (IW_REFUSE_NOT_AT_REST), and IW_STALE_COMMAND_US
+/// after a nonzero drive command (IW_REFUSE_STALE_COMMAND).
 iw_refusal_t iw_gateway_reset(iw_gateway_t *self, iw_time_us_t now_us);
 
 /// Ends a hold (`iw_config_t::hold`): the zeros then end after `zero_hold_ms`, as without a hold. A machine on a slope
 /// may then roll. Refused as IW_REFUSE_NOT_AT_REST while the wheels are driven, ramp down, or wait to be armed.
 iw_refusal_t iw_gateway_release(iw_gateway_t *self);
 
-/// Reports that the connection of `client` has ended.
+/// Reports that the connection of `client` has ended. If it holds the lease, the wheels stop by a ramp
+/// (IW_CAUSE_CLIENT_GONE) without a latch; if it waits to be armed, that ends with IW_REFUSE_NOT_ARMED. For every other
+/// client nothing changes.
 void iw_gateway_disconnect(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t client);
 
-/// Makes the present force of these wheels (bits IW_SIDES_LEFT, IW_SIDES_RIGHT) their zero. If one wheel refuses, none
-/// is changed and `*out_side` is that wheel.
+/// Makes the mean force of the last IW_FORCE_WINDOW_SAMPLES samples (2 s) the offset of these wheels (IW_SIDES_LEFT,
+/// IW_SIDES_RIGHT or IW_SIDES_BOTH). Allowed in every state, with these wheels at standstill and a quiet force that is
+/// near the offset in use, unless that offset is in doubt. Returns IW_TARE_OK; or the reason why a wheel refuses, with
+/// that wheel in `*out_side`: then no offset changes. Writes `*out_side` only then.
 iw_tare_t iw_gateway_tare(iw_gateway_t *self, iw_time_us_t now_us, uint8_t sides, iw_side_t *out_side);
 
 /// Restores a force offset of an earlier run, unless this run has a better one: see `iw_force_restore`.

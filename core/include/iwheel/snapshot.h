@@ -9,7 +9,8 @@
 ///
 /// The values are those at the time of the call: call `iw_gateway_snapshot` again after a step or a request. A pointer
 /// refers to the gateway's own data: it is valid as long as the gateway, and always shows the present values. A step
-/// does not update a snapshot, so only callers of `iw_gateway_snapshot` pay for it.
+/// does not update a snapshot, so only callers of `iw_gateway_snapshot` pay for it. All calls belong to the thread that
+/// calls `iw_gateway_step`, between two steps.
 #ifndef IW_SNAPSHOT_H
 #define IW_SNAPSHOT_H
 
@@ -69,7 +70,8 @@ typedef struct {
     iw_time_us_t pose_us;        ///< Reception time of the last pose; IW_NEVER if there is none.
     iw_time_us_t armed_us;       ///< Time at which ARMED began or the lease moved.
     iw_time_us_t lease_until_us; ///< In ARMED: end of the lease, unless another drive command arrives.
-    iw_time_us_t stale_us;   ///< Last nonzero drive command of any client, accepted or not; IW_NEVER if there is none.
+    /// Send time of the last nonzero drive command of any client, accepted or not; IW_NEVER if there is none.
+    iw_time_us_t stale_us;
     iw_time_us_t waiting_us; ///< Time of the oldest setpoint without TX confirmation; IW_NEVER if there is none.
     /// Send time of the last confirmed setpoint: the older one of the two wheels; 0 until both wheels have one.
     iw_time_us_t confirmed_us;
@@ -84,7 +86,7 @@ typedef struct {
     int32_t pair_largest_mm;  ///< Largest deviation in either direction since ARMED began.
     uint32_t still_moving;    ///< Number of holds that ended after `hold_max_s` while a wheel still turned.
     iw_state_t state;         ///< State that the gateway reports to clients.
-    iw_refusal_t arm_refusal; ///< Reason why the last arming failed.
+    iw_refusal_t arm_refusal; ///< Reason why the last accepted arm request failed; IW_REFUSE_NONE if it did not.
     iw_demand_t demand;       ///< Target of the scheduler since the last step.
     iw_bus_state_t bus;       ///< Last state of the bus.
     iw_assumption_item_t
@@ -115,7 +117,7 @@ bool iw_gateway_arming(const struct iw_gateway *self);
 /// Returns `iw_snapshot_t::arm_refusal`.
 iw_refusal_t iw_gateway_arm_refusal(const struct iw_gateway *self);
 
-/// Returns true while the core sends setpoints, or is about to send one.
+/// Returns true while the demand is not IW_DEMAND_SILENCE: the next steps send setpoints, also zeros.
 bool iw_gateway_is_sending(const struct iw_gateway *self);
 
 #ifdef __cplusplus

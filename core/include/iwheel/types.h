@@ -136,10 +136,11 @@ typedef enum {
     IW_REFUSE_NOT_AT_REST,
     IW_REFUSE_SEND_STALLED,
     IW_REFUSE_SECOND_MASTER,
-    IW_REFUSE_CAUSE_PRESENT, ///< A cause in `iw_snapshot_t::present` is still there.
+    IW_REFUSE_CAUSE_PRESENT, ///< A cause in `iw_snapshot_t::present`, or the zeros after a restart have not ended.
     IW_REFUSE_TYPE_NOT_SET,  ///< Setpoint type or current role is not configured.
     IW_REFUSE_TRACK_NOT_SET, ///< The distance between the wheels is not configured. Every yaw limit depends on it.
-    IW_REFUSE_STALE_COMMAND, ///< `iw_snapshot_t::stale_client` sent a nonzero drive too recently.
+    /// Arm, reset: a nonzero drive command was sent less than IW_STALE_COMMAND_US ago. Drive: sent before ARMED began.
+    IW_REFUSE_STALE_COMMAND,
     IW_REFUSE_LISTEN_ONLY,
     IW_REFUSE_CONTRADICTED, ///< A measurement contradicts `iw_snapshot_t::doubt`, an assumption that motion depends on.
     IW_REFUSALS,
@@ -169,7 +170,7 @@ static inline const char *iw_refusal_text(iw_refusal_t refusal) {
         "a cause of a stop is present; remove it, and wait a second",
         "setpoint_type or current_role is not configured; ask the vendor of the wheels for both",
         "track_mm is not configured, and every limit of turning depends on it; measure and set it",
-        "a nonzero drive command came too recently or from before arming; release the stick, wait, then arm again",
+        "a nonzero drive command was sent too recently, or before arming; release the stick, wait, then arm again",
         "the gateway is configured to listen only; it never sends",
         "a measurement contradicts an assumption that motion depends on; check the configuration of the wheels",
     };
@@ -228,7 +229,7 @@ typedef struct {
     iw_assumption_state_t state; ///< Assumed, confirmed or contradicted.
     iw_source_t source;          ///< Source of that state.
     int32_t figure; ///< Measured value with IW_SOURCE_BUS. Force unit and offset: 1000 x raw / offset in dN. Sign: mm/s
-        ///< measured at a positive command. DLC: the length received. Setpoint type: 1000 x measured / applied speed.
+        ///< measured at a positive command. DLC: length in bytes. Setpoint type: 1000 x measured / applied speed.
         ///< Gear ratio: 1000 x ticks moved / expected. Pose: 1000 x distance read byte-swapped / read in order.
 } iw_assumption_entry_t;
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 "use strict";
-// The pad: it drives only while a hand holds it.
+// The pad: it drives only while a finger or a key is down.
 
-// A mouse or keyboard whose link has failed reports no release. So each report counts as a sign of a hand, and driving needs a fresh one.
+// A mouse or keyboard whose link has failed reports no release. So driving needs a recent report of a movement or a key.
 const HAND_WARN_MS = 1000, HAND_STOP_MS = 2000, DRIVE_MS = 100, YAW_MRAD_S = 800, KEY_SHARE = 0.6;
 const KEYS = { ArrowUp: [0, -1], ArrowDown: [0, 1], ArrowLeft: [-1, 0], ArrowRight: [1, 0] };
 const drive = { on: false, held: false, key: "", sequence: 0, v: 0, yaw: 0, session: 0, hand_ms: 0, pointer: null, keys: new Set() };
@@ -17,7 +17,7 @@ function padSays(words) {
 function showRights() {
   $("drive").hidden = !page.rights.may_drive;
   document.body.classList.toggle("may-drive", page.rights.may_drive);
-  if (drive.on && !page.rights.may_drive) switchPad(false); // The bridge was started again with other rights.
+  if (drive.on && !page.rights.may_drive) switchPad(false); // The bridge was restarted with other rights.
 }
 
 // A place on the pad, from its middle: forward is up, left is left.
@@ -65,7 +65,7 @@ async function hold(x, y) {
   if (drive.held) return;
   drive.held = true;
   $("pad").classList.add("held");
-  const session = ++drive.session, since = page.t_us; // Begin of the hold, by the machine's own clock.
+  const session = ++drive.session, since = page.t_us; // Time at which the pad was pressed, by the machine's own clock.
   try {
     const query = new URLSearchParams({ boot: await bootOf(), t_us: since });
     const answer = await ask("POST", `/api/arm?${query}`, { signal: AbortSignal.timeout(ASK_MS) });
@@ -80,7 +80,7 @@ async function hold(x, y) {
   }
 }
 
-// One command at a time. Each quotes the newest received time: the bridge drops a late one.
+// One command at a time. Each has the newest received time: the bridge drops a late command.
 async function feed(session) {
   while (drive.held && session === drive.session) {
     const begun = performance.now(), still_ms = begun - drive.hand_ms;
@@ -159,7 +159,7 @@ function setUpDriving() {
   document.addEventListener("pointerdown", (event) => {
     if (!drive.held || event.pointerId === drive.pointer) return;
     letGo("why_second");
-    if (pad.contains(event.target)) event.stopPropagation(); // It does not begin to drive, either.
+    if (pad.contains(event.target)) event.stopPropagation(); // It does not start a drive, either.
   }, true);
   visualViewport.addEventListener("resize", () => letGo("why_view"));
   addEventListener("wheel", (event) => { if (event.ctrlKey) letGo("why_view"); }, { passive: true });

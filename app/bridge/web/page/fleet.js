@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
 "use strict";
-// The page of a fleet: what iwheel-fleet wrote last, asked for again and again. It sends nothing else.
+// The page of a fleet. It reads the newest output of iwheel-fleet periodically, and sends nothing else.
 
 const $ = (id) => document.getElementById(id);
 const EVERY_MS = 2000, OLD_MS = 10000;
 
-// Texts come from the machines: they are only ever put in as text.
+// Texts come from the machines: the page inserts them as text only, never as HTML.
 function cell(label, text, kind = "") {
   const made = document.createElement("td");
   made.dataset.label = STRINGS[label];
@@ -60,7 +60,7 @@ function show(fleet, now_ms) {
   tell(say(old ? "fleet_stale" : "fleet_fresh", { time: when(fleet.wall_us) }), old ? "bad" : "good");
 }
 
-// Where each machine has its own page, if that is configured.
+// Address of each machine's own page, if that is configured.
 const pages = { address: null };
 
 async function findPages() {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 "use strict";
-// The language of the page: as chosen here, else the first of the browser's (Accept-Language) that there is, else English.
+// The language of the page: as chosen here; otherwise the first of the browser's (Accept-Language) that exists; otherwise English.
 
 const LANGUAGE = [localStorage.getItem("language"), ...navigator.languages.map((one) => one.split("-")[0]), "en"].find((one) => Object.hasOwn(LANGUAGES, one));
 const STRINGS = LANGUAGES[LANGUAGE];
@@ -10,7 +10,7 @@ function fill(text, values) {
   return text.replace(/\{(\w+)\}/g, (_, key) => values[key] ?? STRINGS.unknown);
 }
 
-// The text of that name with its {gaps} filled.
+// Returns the text of that name with its {names} filled in.
 function say(name, values = {}) {
   return fill(STRINGS[name], values);
 }

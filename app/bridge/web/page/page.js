@@ -59,7 +59,7 @@ function setUp() {
   listen();
   setInterval(show, 200);
   const paint = () => {
-    // Ten minutes are many points: no person sees a fiftieth of a second in them.
+    // Ten minutes are many points: 20 ms are not visible in them.
     if (performance.now() - paint.last >= (view.span_s > 60 ? 500 : 50) || view.plots.some((plot) => plot.forced)) {
       paint.last = performance.now();
       view.plots.forEach((plot) => plot.draw());

@@ -118,7 +118,7 @@ async function load(name) {
   }
 }
 
-// Its files as texts. A file that cannot be read is left out and reported.
+// Returns its files as texts. A file that cannot be read is omitted and reported.
 async function loadAll(name, endings) {
   const files = {};
   for (const ending of endings) {

@@ -26,7 +26,7 @@ function save(blob, name) {
 }
 
 class Series {
-  // Columns of numbers (null: unknown), the first of them seconds. Old rows go in blocks, so that a row costs the same for ever.
+  // Columns of numbers (null: unknown), the first of them seconds. Old rows are removed in blocks, so that the cost of a row stays constant.
   constructor(columns) {
     this.data = Array.from({ length: columns }, () => []);
   }
@@ -198,14 +198,14 @@ class Plot {
     this.uplot.setScale("x", { min: first, max: last });
     this.showAt();
   }
-  // Where a recording is being played, and the values there.
+  // Present time of the recording that is played, and its values.
   showAt() {
     const { min, max } = this.uplot.scales.x, shown = view.at !== null && view.at >= min && view.at <= max;
     this.cursor.hidden = !shown;
     if (shown) this.cursor.style.left = `${this.uplot.valToPos(view.at, "x")}px`;
     this.showValues();
   }
-  // Under the mouse; else where a recording is; else the newest.
+  // Values at the mouse; otherwise at the time of the recording; otherwise the newest.
   showValues() {
     const index = view.at === null ? this.uplot.cursor.idx ?? this.uplot.data[0].length - 1 : Math.max(0, this.indexAt(view.at));
     this.values.forEach((place, n) => {
@@ -301,7 +301,7 @@ class Plot {
   }
 }
 
-// Room above and below, and never a line of noise over the whole height.
+// Margin above and below. Small noise does not fill the whole height.
 function spread(low, high) {
   if (!Number.isFinite(low) || !Number.isFinite(high)) return [-1, 1];
   const room = Math.max((high - low) * 0.1, 1);
@@ -309,7 +309,7 @@ function spread(low, high) {
 }
 
 class Path {
-  // Where the machine went, to scale: x forward is up, y left is left.
+  // Path of the machine, to scale: x forward is up, y left is left.
   constructor(canvas) {
     this.canvas = canvas;
     this.points = [];

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 "use strict";
-// Proves to the bridge that this page has the token. The page never sends the token: another program may hold the port for a moment.
+// Proves to the bridge that this page has the token. The page never sends the token: another program may have the port for a moment.
 
 const proof = { token: "", key: null, session: null };
 
@@ -9,7 +9,7 @@ function takeToken() {
   const found = /[#&]token=([0-9a-f]{32})\b/.exec(location.hash);
   if (found) {
     localStorage.setItem("token", found[1]);
-    history.replaceState(null, "", location.pathname); // No history and no screen shows it.
+    history.replaceState(null, "", location.pathname); // Neither the history nor the screen then shows it.
   }
   setToken(localStorage.getItem("token") ?? "");
 }
@@ -44,7 +44,7 @@ async function bootOf() {
   return (await proof.session).boot;
 }
 
-// One request with its proof. A bridge that was started again does not know the session: then once more, with another one.
+// One request with its proof. A restarted bridge does not know the session: the request is then sent once more, in a new session.
 async function askProved(method, target, options = {}) {
   for (let again = false; ; again = true) {
     const answer = await fetch(target, { ...options, method, headers: { Authorization: await authorization(method, target, options.signal) }, cache: "no-store", credentials: "omit" });

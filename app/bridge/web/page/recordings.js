@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 "use strict";
-// Recordings: read by pieces with their checksums, decoded (docs/developer/protocol.md), and the frames around a stop on a time axis.
+// Recordings: read in pieces with their checksums, decoded (docs/developer/protocol.md), and the frames around a stop on a time axis.
 
 const SETPOINTS = { 266: 0, 298: 1 }, SPEEDS = { 256: 0, 288: 1 }, FORCES = { 512: 0, 544: 1 };
 
@@ -15,7 +15,7 @@ function crc32(bytes, before = 0) {
   return ~crc >>> 0;
 }
 
-// The whole file as bytes. `ask(path)` returns the JSON of a request to the bridge.
+// The whole file as bytes. `ask(path)` returns the JSON reply to a request to the bridge.
 async function readRecording(ask, name, progress) {
   const pieces = [];
   let offset = 0, crc = 0;
@@ -68,7 +68,7 @@ function signed16(data, at) {
   return value >= 0x8000 ? value - 0x10000 : value;
 }
 
-// Series in seconds from the stop, and the events of the .jsonl. null without frames.
+// Series in seconds from the stop, and the events of the .jsonl. null if there are no frames.
 function decodeRecording(files) {
   const frames = parseLog(files.log ?? ""), conf = parseConf(files.conf ?? "");
   const told = (files.jsonl ?? "").split("\n").flatMap((line) => { try { return [JSON.parse(line)]; } catch { return []; } });
@@ -112,7 +112,7 @@ function recordingCsv({ wheels }) {
   return ["t_s,wheel,requested_mm_s,commanded_mm_s,measured_mm_s,force_raw_N", ...lines.map(([t, ...rest]) => [t.toFixed(6), ...rest].join(","))].join("\n") + "\n";
 }
 
-// The command of the client from here on, while it may drive.
+// Sets the command of the client from this time on, while it may drive.
 function take(wheels, one) {
   if (one.type === "drive" && one.refused === null) [wheels[0].wanted, wheels[1].wanted] = [one.left_mm_s, one.right_mm_s];
   if (one.type === "state" && one.state !== "armed") wheels[0].wanted = wheels[1].wanted = null;

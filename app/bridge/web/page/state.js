@@ -102,7 +102,7 @@ function speed(mm_s) {
   return mm_s === null || mm_s === undefined ? null : plain(UNITS[unit](mm_s));
 }
 
-// The figures that are read from two metres away: their units stand in the first column.
+// The figures for reading from two metres away: their units are in the first column.
 function showFigures(state) {
   $("big-unit").textContent = unit;
   for (const side of ["left", "right"]) {
@@ -126,7 +126,7 @@ function showNow(state) {
   $("more-says").classList.toggle("care", many > 0);
 }
 
-// A real button: the last time at which it worked.
+// With a real button: the last time at which it worked.
 function tried(estop) {
   if (estop.simulated || estop.state === "none") return "";
   return fill(STRINGS.tried_says, { when: estop.tried_wall_us ? new Date(estop.tried_wall_us / 1000).toLocaleString() : STRINGS.never });

@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: MIT
 "use strict";
-// STOP, the control that latches, reset, and the question before an action that cannot be undone.
+// STOP, the control that latches, reset, and the confirmation of an action that cannot be undone.
 
 const STOP_TRY_MS = 400;
 
-// Asks once before an action that cannot be undone.
+// Requests one confirmation of an action that cannot be undone.
 // Not modal: a modal dialog would make STOP inert. STOP answers it with no.
 function confirmed(text, yes) {
   const dialog = $("ask"), before = document.activeElement;
-  dialog.onclose?.(); // Another question takes its place.
+  dialog.onclose?.(); // Another confirmation replaces it.
   $("ask-says").textContent = text;
   $("ask-yes").textContent = yes;
   if (!dialog.open) dialog.show();
   $("ask-no").focus({ preventScroll: true });
-  dialog.scrollTop = 0; // In large text the question is longer than the screen: it is read first.
+  dialog.scrollTop = 0; // In large text the question is longer than the screen: begin at its first line.
   return new Promise((done) => {
     $("ask-yes").onclick = () => { done(true); dialog.close(); };
     $("ask-no").onclick = () => dialog.close();
@@ -48,7 +48,7 @@ async function deliver(name) {
       why = STRINGS.no_answer;
     }
     notDelivered(why.replace(`${STRINGS.not_delivered}: `, ""), times);
-    page.stream?.abort(); // It may hold the last connection that the browser allows.
+    page.stream?.abort(); // It may use the last connection that the browser allows.
     await new Promise((done) => setTimeout(done, STOP_TRY_MS / 2));
   }
   deliver.busy = false;
@@ -68,7 +68,7 @@ function tell(words, tone = "") {
   $("delivered").textContent = words;
 }
 
-// The page is not zoomed by touch (page.css), but some browsers zoom every page: the bar then goes along, at its size, measured from its lower edge.
+// The page is not zoomed by touch (page.css), but some browsers zoom every page: the bar then stays at its size and place, measured from its lower edge.
 function keepStopInSight() {
   const seen = visualViewport, bar = $("bar"), factor = 1 / seen.scale;
   bar.style.transform = "";
@@ -88,11 +88,11 @@ function makeRoomForStop() {
 
 function setUpStop() {
   const press = () => { letGo("why_let_go"); deliver("stop"); $("ask").close(); };
-  $("stop").addEventListener("pointerdown", press); // When it is touched, not when the finger leaves it.
+  $("stop").addEventListener("pointerdown", press); // On touch, not when the finger is lifted.
   $("stop").addEventListener("click", (event) => { if (event.detail === 0) press(); }); // By Enter, or by a screen reader.
   $("estop-ask").addEventListener("click", async () => { if (await confirmed(STRINGS.ask_estop, STRINGS.ask_estop_yes)) deliver("estop"); });
   $("reset").addEventListener("click", async () => {
-    const stop = page.stop; // The one that the person sees: a later one is not cleared.
+    const stop = page.stop; // The stop that the person sees: a later one is not cleared.
     if (await confirmed(STRINGS.ask_reset, STRINGS.ask_reset_yes)) reset(stop);
   });
   document.addEventListener("keydown", (event) => {

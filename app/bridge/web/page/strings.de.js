@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 "use strict";
-// Every word of the page in German. Sentences of the gateway itself (why it stopped, in detail; warnings) come in English.
+// All texts of the page in German. Sentences of the gateway itself (why it stopped, in detail; warnings) come in English.
 (globalThis.LANGUAGES ??= {}).de = {
   language_name: "Deutsch",
   locale: "de-DE",

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 "use strict";
-// Every word of the page in English. Texts with {names} are filled in. `cures` and `next` are those of `iwheelctl status` (a test compares them).
+// All texts of the page in English. Texts with {names} are filled in. `cures` and `next` are those of `iwheelctl status` (a test compares them).
 // Another language is one file more: the same names, a line in CMakeLists.txt. language.js selects it.
 (globalThis.LANGUAGES ??= {}).en = {
   language_name: "English",
@@ -55,7 +55,7 @@
   pad_off: "Switch the pad off",
   plots: "Plots",
   freeze: "Freeze",
-  unfreeze: "Go on",
+  unfreeze: "Continue",
   live: "Live",
   span_10: "10 s", span_60: "60 s", span_600: "10 min",
   forces: "Raw force and zero",
@@ -107,7 +107,7 @@
   fleet_help: "Read only. The history of stops, and the recording of one: iwheelctl fleet history, iwheelctl fleet recording.",
   unknown: "unknown",
   not_delivered: "NOT DELIVERED",
-  not_delivered_why: "{why}. Attempts so far: {times}; the page goes on trying. Use the device that cuts the power.",
+  not_delivered_why: "{why}. Attempts so far: {times}; the page tries again. Use the device that cuts the power.",
   stopping_now: "Stop sent, waiting for the answer …",
   delivered: "Stop delivered: the gateway reports “{state}”.",
   refused: "Refused: {why}",
@@ -122,7 +122,7 @@
   pad_ready: "Hold the pad to drive.",
   pad_drives: "Driving.",
   pad_limited: "Driving; the gateway limits this command.",
-  pad_no_hand: "Nothing moves on the pad for 1 s: move, or the wheels stop.",
+  pad_no_hand: "No movement on the pad for 1 s: move, or the wheels stop.",
   pad_command: "Command", pad_measured: "Measured", pad_turn: "{deg} °/s", pad_limit: "Limit",
   pad_stopped: "Stopped: {why}.",
   why_let_go: "the pad was released",
@@ -185,7 +185,7 @@
   recording_loading: "Reading {name}: {percent} %",
   recording_broken: "{name} does not match its checksum; try again",
   recording_shown: "Recording {name}: recorded frames, not live values.",
-  recording_bad: "{name} holds no frames.",
+  recording_bad: "{name} contains no frames.",
   source_live: "Live values.",
   source_frozen: "Frozen at {when}; the machine is not.",
   player_at: "{s} s from the stop: {state}",

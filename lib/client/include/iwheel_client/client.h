@@ -113,9 +113,9 @@ IWC_API bool iwc_pending(const iwc_t *self);
 /// Returns true if this connection may only watch, stop and e-stop. The gateway refuses everything else ("denied").
 IWC_API bool iwc_watches_only(const iwc_t *self);
 
-/// Returns the path of the last `iwc_connect`; empty: none.
+/// Returns the path of the last `iwc_connect`; empty: none. Valid until the next `iwc_connect` or `iwc_free`.
 IWC_API const char *iwc_path(const iwc_t *self);
-/// Returns the errno with which the last `iwc_connect` failed; 0: it failed for another reason, or not.
+/// Returns the errno with which the last `iwc_connect` failed; 0 if it succeeded, or failed without an errno.
 IWC_API int iwc_errno(const iwc_t *self);
 /// Returns the number that the gateway assigned to this connection; `lease.holder` has it if the connection holds the
 /// lease. 0: none.
@@ -129,7 +129,7 @@ IWC_API void iwc_let_in(iwc_t *self, const sigset_t *mask);
 
 /// A reply or event. Valid until the next call with the same handle, except `iwc_latest`, `iwc_pending`, `iwc_fd`.
 typedef struct {
-    const char *text; ///< One JSON object, terminated. Ignore unknown fields.
+    const char *text; ///< One JSON object, terminated by a zero byte. Ignore unknown fields.
     size_t length;    ///< Length of `text` in bytes.
     bool is_event;    ///< True: an event. False: a reply.
     int64_t id;       ///< Id of the request that a reply answers; 0 for an event.
@@ -202,8 +202,9 @@ IWC_API bool iwc_reply(const iwc_t *self, iwc_message_t *out_reply);
 IWC_API const char *iwc_error(const iwc_t *self);
 /// Returns why the last call that failed did so: the gateway's message of a refusal (cause and fix), otherwise the text
 /// of `iwc_words`. One line, never empty: before the first connection the text of IWC_CLOSED, and after a connection on
-/// which no call has failed that of IWC_OK. `self` may be NULL (iwc_new found no memory). A call that succeeds changes nothing, and no message within the timeout of
-/// `iwc_next` is not a failure. Valid until the next call with the same handle.
+/// which no call has failed that of IWC_OK. `self` may be NULL (iwc_new found no memory). A call that succeeds changes
+/// nothing. An `iwc_next` without a message within its timeout is not a failure. Valid until the next call with the
+/// same handle.
 IWC_API const char *iwc_reason(const iwc_t *self);
 
 // ---- reading ------------------------------------------------------------------------------------------------------
@@ -329,12 +330,20 @@ typedef struct {
     bool limited;       ///< Both wheels were scaled by one factor, or a current limit was raised.
 } iwc_applied_t;
 
-/// Sends one drive command, once. It is valid for one lease. With `timeout_ms` 0 the call only sends, and `iwc_next`
-/// returns the reply; otherwise it waits for the reply as `iwc_ask`, and writes the targets to `out_applied` (may be
-/// NULL). The gateway refuses it before it has replied to `iwc_arm`.
+/// Sends one drive command, once. It is valid for `iwc_terms_t::lease_ms` from now; without a newer one the wheels then
+/// stop by a ramp. The connection must hold the lease: a command before the reply to `iwc_arm` is refused. A value out
+/// of range is refused ("out_of_range") for both wheels; a speed above a limit is scaled (`iwc_applied_t::limited`). A
+/// refused command does not extend the lease, and the last accepted one stays in force until the lease ends.
+///
+/// With `timeout_ms` 0 the call only sends: IWC_OK means sent, IWC_FULL not sent, and `iwc_next` returns the reply.
+/// Otherwise it waits as `iwc_ask`, with the same results. Writes `*out_applied` (may be NULL) only if it has waited
+/// and returns IWC_OK.
 IWC_API iwc_result_t iwc_drive(iwc_t *self, const iwc_drive_t *command, int timeout_ms, iwc_applied_t *out_applied);
 
-/// Like `iwc_drive`, with forward speed and turning rate, positive to the left (mrad/s).
+/// Like `iwc_drive`, with forward speed in mm/s and turning rate in mrad/s, positive to the left. The gateway
+/// calculates both wheel speeds from its `track_mm`; they have the range of `iwc_drive_t`. The command has no currents,
+/// so the gateway refuses it ("missing_field") if current_role is setpoint. It refuses a turn ("denied") while `track`
+/// is contradicted.
 IWC_API iwc_result_t iwc_twist(iwc_t *self, int32_t v_mm_s, int32_t yaw_mrad_s, int timeout_ms,
                                iwc_applied_t *out_applied);
 

@@ -129,9 +129,9 @@ static const char *manner(const iw_stop_t *stop) {
         return "nothing was being sent; latched";
     }
     if (stop->latched) {
-        return stop->at_once ? "zero at once, latched" : "ramped to zero, latched";
+        return stop->at_once ? "set to zero immediately, latched" : "ramped to zero, latched";
     }
-    return stop->at_once ? "zero at once" : "ramped to zero";
+    return stop->at_once ? "set to zero immediately" : "ramped to zero";
 }
 
 /// Appends the activity at the time of the stop.

@@ -3,7 +3,7 @@
 ///
 /// A board consists of this header and `memory.ld` next to it; the files of the family do the rest. To add another
 /// board of the same family, copy this folder, change the differences, and select it with -DIWHEEL_BOARD. A clock that
-/// cannot give the exact bit rate does not compile.
+/// cannot produce the exact bit rate does not compile.
 #ifndef BRD_BOARD_H
 #define BRD_BOARD_H
 
