@@ -935,7 +935,7 @@ def test_tls_needs_a_trusted_certificate_and_its_key(rig):
     rig.start_gateway()
     rig.web_settings["web"].update(certificate=rig.path("ours.pem"), key=rig.path("other.key"))
     web = rig.start_web(wait=False)
-    assert web.wait(5) == 78 and "no certificate that fits the key" in web.text(), web.text()
+    assert web.wait(5) == 78 and "does not fit the key" in web.text(), web.text()
     rig.web_settings["web"].update(key=rig.path("ours.key"))
     rig.start_web(wait=False)
 

@@ -292,7 +292,7 @@ def test_pad_held_without_evidence_of_a_hand_stops_after_2_s(rig):
             last = now_us()
             time.sleep(0.5)  # The last movement has also changed the setpoints.
             assert rig.ask_json("GET", "/api/status")[1]["state"] == "armed", f"it stopped although the finger moved: {page.inner_text('#pad-says')}"
-            seen(page, "document.querySelector('#pad-says').textContent.includes('Nothing moves on the pad')")
+            seen(page, "document.querySelector('#pad-says').textContent.includes('No movement on the pad')")
             braked_ms = 500 + braking_ms(rig, last + 500_000, 3)
             assert 1700 < braked_ms < 2500, f"{braked_ms} ms"
             seen(page, "document.querySelector('#pad-says').textContent.includes('hold the pad again')")
