@@ -38,7 +38,7 @@ REFUSALS = {  # Options, and the text that the message must contain.
     "-DIWHEEL_CRYSTAL_HZ=25MHz": "must be a number of Hz, for instance 25000000",
     "-DIWHEEL_CAN_PINS=PD0": "it must be PB8 (receive PB8, transmit PB9) or PA11",
     "-DIWHEEL_GATEWAY=ON -DIWHEEL_BAUD=1M": "it must be a number from 115200 to 2000000",
-    "-DIWHEEL_GATEWAY=ON -DIWHEEL_DEMO=ON -DIWHEEL_SETPOINT_TYPE=1 -DIWHEEL_CURRENT_ROLE=limit": "one of the two commands",
+    "-DIWHEEL_GATEWAY=ON -DIWHEEL_DEMO=ON -DIWHEEL_SETPOINT_TYPE=1 -DIWHEEL_CURRENT_ROLE=limit": "IWHEEL_GATEWAY or IWHEEL_DEMO, not both",
     "-DIWHEEL_BOARD=stm32f999": "must be one of: stm32f103;stm32f407;stm32f446;stm32g474",
     "-DIWHEEL_BOARD=stm32f407": "has no cortex-m3",
     "-DIWHEEL_SETPOINT_TYPE=1 -DIWHEEL_CURRENT_ROLE=setpoint -DIWHEEL_DEMO=ON": "IWHEEL_DEMO needs",
