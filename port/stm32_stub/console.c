@@ -16,7 +16,7 @@
 static_assert((LENGTH & (LENGTH - 1U)) == 0U, "the indices wrap at a power of two");
 
 static char waiting[LENGTH];
-static uint32_t put, taken; // Characters since the start.
+static uint32_t put, sent; // Characters since the start.
 
 void brd_console_start(uint32_t apb1_hz) {
     BRD_USART2->BRR = (apb1_hz + BAUD / 2U) / BAUD; // 27.3.4: in sixteenths.
@@ -25,7 +25,7 @@ void brd_console_start(uint32_t apb1_hz) {
 
 /// Drops a character that does not fit: the control loop never waits for a terminal (R11).
 static void append(char character) {
-    if (put - taken < LENGTH - 1U) {
+    if (put - sent < LENGTH - 1U) {
         waiting[put++ % LENGTH] = character;
     }
 }
@@ -57,10 +57,10 @@ void brd_console_hex(uint32_t value) {
 }
 
 bool brd_console_step(void) {
-    if (put != taken && (BRD_USART2->SR & TXE) != 0U) {
-        BRD_USART2->BRD_USART_TDR = (uint8_t)waiting[taken++ % LENGTH];
+    if (put != sent && (BRD_USART2->SR & TXE) != 0U) {
+        BRD_USART2->BRD_USART_TDR = (uint8_t)waiting[sent++ % LENGTH];
     }
-    return put != taken;
+    return put != sent;
 }
 
 bool brd_console_asked(void) {

@@ -22,7 +22,7 @@ static_assert((BRD_SERIAL_RECEIVE_BYTES & (BRD_SERIAL_RECEIVE_BYTES - 1U)) == 0U
 // The DMA accesses these, and interrupt handlers have no argument, so they have file scope.
 static char received[BRD_SERIAL_RECEIVE_BYTES];
 static char waiting[BRD_SERIAL_SEND_BYTES];
-static uint32_t taken;     // Position of the next received byte to read.
+static uint32_t tail;      // Position of the next received byte to read.
 static uint32_t put, sent; // Bytes put into and sent from `waiting` since the start.
 static uint32_t sending;   // Number of these bytes that the DMA sends now.
 static const char *lent;   // Buffer of a caller; NULL: none.
@@ -33,7 +33,7 @@ static atomic_bool had_error;
 
 void brd_serial_start(uint32_t apb1_hz) {
     BRD_USART2->CR1 = 0;
-    taken = put = sent = sending = 0;
+    tail = put = sent = sending = 0;
     lent = NULL;
     lent_is_sending = false;
     BRD_USART2->BRR = (apb1_hz + BRD_SERIAL_BAUD / 2U) / BRD_SERIAL_BAUD; // 27.3.4: sixteenths.
@@ -48,9 +48,9 @@ void brd_serial_start(uint32_t apb1_hz) {
 size_t brd_serial_read(char *out, size_t size) {
     const uint32_t head = BRD_SERIAL_RECEIVE_BYTES - brd_serial_dma_left();
     size_t count = 0;
-    while (count < size && taken != head % BRD_SERIAL_RECEIVE_BYTES) {
-        out[count++] = received[taken];
-        taken = (taken + 1U) % BRD_SERIAL_RECEIVE_BYTES;
+    while (count < size && tail != head % BRD_SERIAL_RECEIVE_BYTES) {
+        out[count++] = received[tail];
+        tail = (tail + 1U) % BRD_SERIAL_RECEIVE_BYTES;
     }
     return count;
 }
@@ -58,7 +58,7 @@ size_t brd_serial_read(char *out, size_t size) {
 /// A bus error disables the receive channel (13.3.4). It starts again, with the loss of the bytes meanwhile.
 bool brd_serial_had_error(void) {
     if (!brd_serial_dma_receives()) {
-        taken = 0;
+        tail = 0;
         brd_serial_dma_start(&BRD_USART2->BRD_USART_RDR, received, sizeof received);
         return true;
     }

@@ -283,13 +283,13 @@ class Judge(Reading):
     def _rest_since_us(self, from_us):
         """When both wheels have been at standstill for the settling time, at from_us or later. An offline wheel is not at standstill."""
         since = {SPEED_IDS[0]: None, SPEED_IDS[1]: None}
-        heard = dict(since)
+        newest_us = dict(since)
         # What was before the settling time does not matter: telemetry of a wheel at standstill is back within UNHEARD_US.
         first = bisect.bisect_left(self._frame_times, from_us - SETTLED_US - 2 * UNHEARD_US)
         for frame in itertools.islice(self.frames, first, None):
             if frame.id not in since or frame.own or len(frame.data) < 2:
                 continue
-            before, heard[frame.id] = heard[frame.id], frame.t_us
+            before, newest_us[frame.id] = newest_us[frame.id], frame.t_us
             if before is not None and frame.t_us - before > UNHEARD_US:
                 since[frame.id] = None
             if abs(signed(frame.data, 0)) > REST_RPM:
@@ -297,7 +297,7 @@ class Judge(Reading):
             elif since[frame.id] is None:
                 since[frame.id] = frame.t_us
             settled = all(t is not None and frame.t_us - t >= SETTLED_US for t in since.values())
-            if settled and frame.t_us >= from_us and all(frame.t_us - t <= UNHEARD_US for t in heard.values()):
+            if settled and frame.t_us >= from_us and all(frame.t_us - t <= UNHEARD_US for t in newest_us.values()):
                 return frame.t_us
         return None
 

@@ -392,8 +392,8 @@ def test_slow_connections_and_bombs_cost_the_gateway_no_gap(rig):
 def test_watchers_leave_room_for_stop(rig):
     rig.start().connected()
     streams = [rig.stream() for _ in range(7)]
-    told = [stream.recv(100).split()[1] for stream in streams]
-    assert told == [b"200"] * 5 + [b"503"] * 2, told
+    statuses = [stream.recv(100).split()[1] for stream in streams]
+    assert statuses == [b"200"] * 5 + [b"503"] * 2, statuses
     idle = [socket.create_connection(("127.0.0.1", rig.port)) for _ in range(8)]
     assert rig.ask("POST", "/api/estop")[0] == 200
     until(lambda: b"latched" in streams[0].recv(65536), what="earlier watchers continue to watch")

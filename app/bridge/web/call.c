@@ -201,17 +201,17 @@ static ssize_t read_stream(void *context, uint64_t position, char *out, size_t s
     if (server->ending || self->verdict.route == NULL) {
         return MHD_CONTENT_READER_END_OF_STREAM;
     }
-    size_t taken = web_reader_take(&self->reader, &server->link.feed, out, size);
-    if (taken == 0U && server->now_us - self->told_us >= WEB_PULSE_US && size >= sizeof pulse) {
+    size_t length = web_reader_take(&self->reader, &server->link.feed, out, size);
+    if (length == 0U && server->now_us - self->told_us >= WEB_PULSE_US && size >= sizeof pulse) {
         memcpy(out, pulse, sizeof pulse); // Shows both ends that the other end is online.
-        taken = sizeof pulse;
+        length = sizeof pulse;
     }
-    if (taken == 0U) {
+    if (length == 0U) {
         web_call_suspend(self);
         return 0;
     }
     self->told_us = server->now_us;
-    return (ssize_t)taken;
+    return (ssize_t)length;
 }
 
 static enum MHD_Result send_events(web_call_t *self) {

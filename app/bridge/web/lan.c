@@ -55,22 +55,23 @@ static void host_name(char out[NAME_SIZE]) {
 /// Writes a new file and renames it, so that no program reads an incomplete file. Only the owner may read it. Returns 0,
 /// or an exit code with a line on stderr.
 static int write_file(const char *path, const gnutls_datum_t *data) {
-    char beside[128];
-    (void)snprintf(beside, sizeof beside, "%s.new", path);
-    (void)unlink(beside);
-    const int file = open(beside, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0600);
+    char temporary[128];
+    (void)snprintf(temporary, sizeof temporary, "%s.new", path);
+    (void)unlink(temporary);
+    const int file = open(temporary, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0600);
     if (file < 0) {
-        return complain(beside, strerror(errno), NO_WRITE);
+        return complain(temporary, strerror(errno), NO_WRITE);
     }
     errno = ENOSPC; // A short write sets no errno.
     const bool written = write(file, data->data, data->size) == (ssize_t)data->size;
     const int error = errno;
     (void)close(file);
     if (!written) {
-        return complain(beside, strerror(error),
+        return complain(temporary, strerror(error),
                         "make room on this disk, or let token_file name a folder on another one");
     }
-    return (rename(beside, path) == 0) ? 0 : complain(path, strerror(errno), "remove it, and start the bridge again");
+    return (rename(temporary, path) == 0) ? 0
+                                          : complain(path, strerror(errno), "remove it, and start the bridge again");
 }
 
 /// Adds the names and addresses by which a browser may call this machine.

@@ -61,14 +61,14 @@ static bool is_made_of(const page_body_t *packed, const page_body_t *plain) {
 }
 
 bool page_file_read(page_file_t *self, const char *path) {
-    char beside[272];
+    char packed_path[272];
     *self = (page_file_t){.plain = {.text = NULL}};
     self->plain.text = page_read_all(path, &self->plain.length);
     if (self->plain.text == NULL) {
         return false;
     }
-    (void)snprintf(beside, sizeof beside, "%s.gz", path);
-    self->packed.text = page_read_all(beside, &self->packed.length);
+    (void)snprintf(packed_path, sizeof packed_path, "%s.gz", path);
+    self->packed.text = page_read_all(packed_path, &self->packed.length);
     if (!is_made_of(&self->packed, &self->plain)) {
         free(self->packed.text);
         self->packed = (page_body_t){.text = NULL};

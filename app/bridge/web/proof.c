@@ -91,13 +91,13 @@ static web_proof_t judge_mac(web_proofs_t *self, const char *token, const web_cl
                              uint64_t *out_session) {
     char id[BRIDGE_SECRET_SIZE] = "";
     char nonce[BRIDGE_SECRET_SIZE] = "";
-    char given[WEB_MAC_SIZE] = "";
+    char received[WEB_MAC_SIZE] = "";
     char mac[WEB_MAC_SIZE];
     char text[WEB_TARGET_SIZE + 160U];
     char digits[19] = "";
     int end = 0;
     const int found = sscanf(claim->authorization + strlen("IWheel "), "%32[0-9a-f] %32[0-9a-f] %18[0-9] %64[0-9a-f]%n",
-                             id, nonce, digits, given, &end);
+                             id, nonce, digits, received, &end);
     const uint64_t sequence = strtoull(digits, NULL, 10);
     if (found != 4 || claim->authorization[strlen("IWheel ") + (size_t)end] != '\0' || sequence == 0U ||
         strlen(id) != 32U || strlen(nonce) != 32U || strlen(claim->target) >= WEB_TARGET_SIZE) {
@@ -105,7 +105,7 @@ static web_proof_t judge_mac(web_proofs_t *self, const char *token, const web_cl
     }
     (void)snprintf(text, sizeof text, "%.16s\n%s\n%s\n%s\n%" PRIu64, claim->method, claim->target, id, nonce, sequence);
     make_mac(token, text, mac);
-    if (token[0] == '\0' || !bridge_secret_is(mac, given)) {
+    if (token[0] == '\0' || !bridge_secret_is(mac, received)) {
         return WEB_PROOF_WRONG;
     }
     web_session_t *session = find(self, id);

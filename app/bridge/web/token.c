@@ -16,10 +16,10 @@ static bool complain(const web_token_t *self, const char *what, FILE *err) {
 /// Writes a new file and renames it, so that no program reads an incomplete file.
 static bool make(const web_token_t *self, FILE *err) {
     char token[WEB_TOKEN_SIZE];
-    char beside[128];
-    (void)snprintf(beside, sizeof beside, "%s.new", self->path);
-    (void)unlink(beside);
-    const int file = open(beside, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0600);
+    char temporary[128];
+    (void)snprintf(temporary, sizeof temporary, "%s.new", self->path);
+    (void)unlink(temporary);
+    const int file = open(temporary, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0600);
     if (file < 0 || !bridge_secret_draw(token)) {
         (void)complain(self, strerror(errno), err);
         return complain(self, "cannot be made; let token_file name a folder in which the bridge may write", err);
@@ -27,7 +27,8 @@ static bool make(const web_token_t *self, FILE *err) {
     token[WEB_TOKEN_SIZE - 1U] = '\n';
     const bool written = write(file, token, sizeof token) == (ssize_t)sizeof token;
     (void)close(file);
-    return (written && rename(beside, self->path) == 0) || complain(self, "cannot be written; is the disk full?", err);
+    return (written && rename(temporary, self->path) == 0) ||
+           complain(self, "cannot be written; is the disk full?", err);
 }
 
 static bool read_file(web_token_t *self, int file, const struct stat *status, bool *out_changed) {

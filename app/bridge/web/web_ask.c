@@ -9,7 +9,7 @@
 const char *const web_not_there =
     "NOT DELIVERED: the gateway does not answer; check that it runs: systemctl status iwheel-gateway";
 
-static void keep(web_call_t *self, unsigned status, const char *before, const char *text, size_t length) {
+static void store(web_call_t *self, unsigned status, const char *before, const char *text, size_t length) {
     const size_t head = strlen(before);
     self->reply = malloc(head + length + 1U);
     self->status = (self->reply != NULL) ? status : 500U;
@@ -29,11 +29,11 @@ static void begin_driving(web_call_t *self, const iwc_message_t *reply) {
     web_driver_begin(&self->server->driver, self->server->now_us);
     self->server->driver_session = self->session;
     if (iwc_text(reply, "key", key, sizeof key)) {
-        keep(self, 200, "", reply->text, reply->length);
+        store(self, 200, "", reply->text, reply->length);
         return;
     }
     (void)snprintf(before, sizeof before, "{\"key\":\"%s\",", bridge_lease_key(&self->server->link.lease));
-    keep(self, 200, before, reply->text + 1, reply->length - 1U);
+    store(self, 200, before, reply->text + 1, reply->length - 1U);
 }
 
 static void take_answer(void *context, const iwc_message_t *reply) {
@@ -42,11 +42,11 @@ static void take_answer(void *context, const iwc_message_t *reply) {
     if (reply == NULL) {
         static const char gone[] = "{\"ok\":false,\"error\":\"not_delivered\",\"message\":\"NOT DELIVERED: the gateway "
                                    "did not answer in time\"}";
-        keep(self, 504, "", gone, sizeof gone - 1U);
+        store(self, 504, "", gone, sizeof gone - 1U);
     } else if (good && self->verdict.route->verb == WEB_ARM) {
         begin_driving(self, reply);
     } else {
-        keep(self, good ? 200U : 409U, "", reply->text, reply->length);
+        store(self, good ? 200U : 409U, "", reply->text, reply->length);
     }
     web_call_resume(self);
 }
@@ -57,7 +57,7 @@ static enum MHD_Result went_out(web_call_t *self, bool asked) {
     char text[256];
     if (!asked) {
         const int length = snprintf(text, sizeof text, "%s%s\"}", gone, web_not_there);
-        keep(self, 503, "", text, (size_t)length);
+        store(self, 503, "", text, (size_t)length);
         web_call_resume(self);
     }
     return MHD_YES;

@@ -21,8 +21,8 @@
 /// Memory of a connection: for a request with its headers, and for a part of the answer.
 #define BYTES_PER_CONNECTION 16384U
 
-static int complain(int code, const char *what, const char *cure) {
-    (void)fprintf(stderr, "iwheel-web: %s: %s\n", what, cure);
+static int complain(int code, const char *what, const char *fix) {
+    (void)fprintf(stderr, "iwheel-web: %s: %s\n", what, fix);
     return code;
 }
 

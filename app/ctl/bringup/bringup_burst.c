@@ -166,8 +166,8 @@ static bool ran_away(run_t *run, const json_t *why) {
     }
     for (unsigned side = 0; side < IW_SIDES; side++) {
         int *peak = &run->outcome->peak_mm_s[side];
-        const bool told = strcmp(side_word, text_side(side)) == 0 || strcmp(side_word, "both") == 0;
-        if (told && abs(measured) > abs(*peak)) {
+        const bool commanded = strcmp(side_word, text_side(side)) == 0 || strcmp(side_word, "both") == 0;
+        if (commanded && abs(measured) > abs(*peak)) {
             *peak = measured;
         }
     }

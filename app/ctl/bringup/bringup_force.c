@@ -10,7 +10,7 @@
 #include <time.h>
 
 #define LOOK_NS     50000000L
-#define LOOKS       40
+#define SAMPLES     40
 #define SETTLE_NS   300000000L // Time until the force frames show a new load.
 #define G_N_PER_kg  9.8        // Value in the document.
 #define MASS_MIN_kg 0.5
@@ -43,7 +43,7 @@ static force_t look_at_force(bringup_t *self, iw_side_t side) {
     (void)fputs("  ... measuring for 2 s\n", stdout);
     (void)fflush(stdout);
     (void)nanosleep(&settle, NULL);
-    for (int i = 0; i < LOOKS; i++) {
+    for (int i = 0; i < SAMPLES; i++) {
         json_t *status = trial_status(self);
         const json_t *raw = json_object_get(json_object_get(status, text_side(side)), "force_raw");
         if (json_is_integer(raw)) {
@@ -64,7 +64,7 @@ static force_t look_at_force(bringup_t *self, iw_side_t side) {
         bringup_quit(self);
     }
     force.mean = (count > 0) ? sum / count : 0.0;
-    force.heard = count >= LOOKS * 9 / 10;
+    force.heard = count >= SAMPLES * 9 / 10;
     return force;
 }
 

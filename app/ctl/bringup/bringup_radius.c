@@ -86,11 +86,11 @@ static bool judge_radius(bringup_t *self, const hand_t *hand, double distance_m)
         talk_say("  That is no radius between %u and %u mm: was the distance in metres?", range.min, range.max);
         return false;
     }
-    const bool taken = talk_yes(self, "Use the mean?", straight);
-    if (taken) {
+    const bool accepted = talk_yes(self, "Use the mean?", straight);
+    if (accepted) {
         keep_radius(self, hand, distance_m, mean, straight);
     }
-    return taken;
+    return accepted;
 }
 
 void bringup_radius(bringup_t *self) {

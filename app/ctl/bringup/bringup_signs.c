@@ -22,9 +22,9 @@ static burst_t turn(const bringup_t *self, int left_mm_s, int right_mm_s) {
 /// Checks what the bus shows: the commanded wheel turned, the other one did not, and the measured sign is the commanded
 /// one. Prints what is wrong.
 static bool bus_agrees(const bringup_t *self, const outcome_t *outcome, iw_side_t side) {
-    const int told = outcome->mean_mm_s[side];
+    const int driven = outcome->mean_mm_s[side];
     const int other = outcome->mean_mm_s[(side == IW_LEFT) ? IW_RIGHT : IW_LEFT];
-    if (abs(told) < MOVES_MM_S && abs(other) >= MOVES_MM_S) {
+    if (abs(driven) < MOVES_MM_S && abs(other) >= MOVES_MM_S) {
         talk_say("By the bus the OTHER wheel turned: left and right are exchanged. Their ids are fixed, so "
                  "exchange the wheels (or their plugs), then begin again.");
         return false;
@@ -33,17 +33,17 @@ static bool bus_agrees(const bringup_t *self, const outcome_t *outcome, iw_side_
         talk_say(
             "By the bus BOTH wheels turned (%d and %d mm/s), although only the %s one was commanded. Find out what "
             "turned the other one: until then no sign can be found.",
-            told, other, text_side(side));
+            driven, other, text_side(side));
         return false;
     }
-    if (told <= -MOVES_MM_S) {
+    if (driven <= -MOVES_MM_S) {
         talk_say(
             "The %s wheel measures the opposite of its command. No configuration key corrects that, and the gateway "
             "would stop for it (feedback_sign): check the wiring between motor and sensor, or ask the maker.",
             text_side(side));
         return false;
     }
-    if (told < MOVES_MM_S) {
+    if (driven < MOVES_MM_S) {
         talk_say("The %s wheel did not turn. Is it blocked? If it needs more current: --current (now %d mA).",
                  text_side(side), self->current_mA);
         return false;

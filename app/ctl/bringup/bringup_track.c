@@ -95,11 +95,11 @@ static bool judge_track(bringup_t *self, const hand_t *hand, int turns) {
     if (!near) {
         tell_off(self);
     }
-    const bool taken = talk_yes(self, "Use that?", near);
-    if (taken) {
+    const bool accepted = talk_yes(self, "Use that?", near);
+    if (accepted) {
         keep_track(self, hand, turns, track_mm);
     }
-    return taken;
+    return accepted;
 }
 
 /// Asks for a whole number of turns. Returns 0 if the operator skips the step.

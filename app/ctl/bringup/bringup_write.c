@@ -86,7 +86,7 @@ static void print_head(const char *date, FILE *out) {
 }
 
 /// Moves the new file to its place; an existing file is renamed to PATH.old.
-static bool put_in_place(const char *beside, const char *path) {
+static bool put_in_place(const char *temporary, const char *path) {
     char old[512];
     if (access(path, F_OK) == 0) {
         (void)snprintf(old, sizeof old, "%.500s.old", path);
@@ -95,16 +95,16 @@ static bool put_in_place(const char *beside, const char *path) {
         }
         talk_say("The old file is now %s.", old);
     }
-    return rename(beside, path) == 0;
+    return rename(temporary, path) == 0;
 }
 
 /// Writes the text to a file next to `path` and moves it to `path`.
 static bool write_text(const char *path, const char *text, size_t length, bool saved) {
-    char beside[512];
-    (void)snprintf(beside, sizeof beside, "%.500s.new", path);
-    FILE *file = fopen(beside, "we");
+    char temporary[512];
+    (void)snprintf(temporary, sizeof temporary, "%.500s.new", path);
+    FILE *file = fopen(temporary, "we");
     if (file == NULL) {
-        talk_say("Cannot write %s: %s. Choose another file.", beside, strerror(errno));
+        talk_say("Cannot write %s: %s. Choose another file.", temporary, strerror(errno));
         return false;
     }
     (void)fwrite(text, 1, length, file);
@@ -112,9 +112,9 @@ static bool write_text(const char *path, const char *text, size_t length, bool s
         bringup_print_mark(text, length, file);
     }
     const bool written = fflush(file) == 0 && ferror(file) == 0 && fsync(fileno(file)) == 0;
-    if (fclose(file) != 0 || !written || !put_in_place(beside, path)) {
+    if (fclose(file) != 0 || !written || !put_in_place(temporary, path)) {
         talk_say("Cannot write %s: %s. Choose another file.", path, strerror(errno));
-        (void)unlink(beside);
+        (void)unlink(temporary);
         return false;
     }
     return true;
@@ -187,20 +187,20 @@ static const char *how_of(const bringup_note_t *note, char out_how[HOW_SIZE]) {
 /// them. Returns false if any of them was not accepted.
 static bool confirm_all(bringup_t *self) {
     char value[32];
-    bool taken = trial_start_with_records(self);
-    for (unsigned i = 0; i < self->notes && taken; i++) {
+    bool accepted = trial_start_with_records(self);
+    for (unsigned i = 0; i < self->notes && accepted; i++) {
         const bringup_note_t *note = &self->note[i];
         if (note->item != NULL) {
             char how[HOW_SIZE];
             json_t *reply =
                 near_ask(self->ctl, json_pack("{s:s,s:s,s:s,s:s}", "cmd", "confirm", "item", note->item, "value",
                                               value_of(self, note, value), "how", how_of(note, how)));
-            taken = strcmp(text_word(reply, "state"), "confirmed") == 0;
+            accepted = strcmp(text_word(reply, "state"), "confirmed") == 0;
             json_decref(reply);
         }
     }
     trial_stop(self);
-    return taken;
+    return accepted;
 }
 
 /// Returns true if the written files will belong to the gateway: it could not replace the files of another user.

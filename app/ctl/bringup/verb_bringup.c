@@ -87,9 +87,9 @@ static void introduce(bringup_t *self) {
     }
 }
 
-_Noreturn static void end(bringup_t *self, const char *told) {
+_Noreturn static void end(bringup_t *self, const char *message) {
     trial_close(self);
-    talk_say("%s", told);
+    talk_say("%s", message);
     exit(ctl_finish(CTL_NO));
 }
 

@@ -163,8 +163,8 @@ class _Stream(asyncio.Protocol):
         return self.events.popleft() if self.events else None
 
     def _leave_out(self) -> None:
-        kept, left_out = newest(self.events)
-        self.events, self._lost = deque(kept), self._lost + left_out
+        retained, left_out = newest(self.events)
+        self.events, self._lost = deque(retained), self._lost + left_out
 
     # Functions that the event loop calls
 

@@ -143,8 +143,8 @@ class Connection:
 
     def _require(self) -> socket.socket:
         if self._socket is None:
-            told = f"{self.path}: the connection is closed" if self._error is None else str(self._error)
-            raise GatewayUnavailable(told)
+            reason = f"{self.path}: the connection is closed" if self._error is None else str(self._error)
+            raise GatewayUnavailable(reason)
         return self._socket
 
     def _readable(self, seconds: float) -> bool:

@@ -73,12 +73,12 @@ def may_use(path: str) -> bool:
 def cannot_connect(path: str, error: OSError) -> GatewayUnavailable:
     """Returns the error with its fix."""
     if isinstance(error, PermissionError):
-        cure = "this user may not use it; join its group (usermod -aG iwheel USER), then log in again"
+        remedy = "this user may not use it; join its group (usermod -aG iwheel USER), then log in again"
     elif isinstance(error, (FileNotFoundError, ConnectionRefusedError)):
-        cure = "no gateway listens there; start it, or name another socket"
+        remedy = "no gateway listens there; start it, or name another socket"
     else:
-        cure = str(error)
-    return GatewayUnavailable(f"{path}: {cure}")
+        remedy = str(error)
+    return GatewayUnavailable(f"{path}: {remedy}")
 
 
 class Wire:
@@ -232,7 +232,7 @@ def lost_event(count: int) -> Event:
 
 def newest(events: Iterable[Event]) -> tuple[list[Event], int]:
     """Returns only the newest event of each kind, and the number of dropped ones, including those that the gateway reports (`lost`)."""
-    kept: dict[tuple[str, ...], Event] = {}
+    retained: dict[tuple[str, ...], Event] = {}
     left_out = 0
     for event in events:
         if event["event"] == "lost":
@@ -240,9 +240,9 @@ def newest(events: Iterable[Event]) -> tuple[list[Event], int]:
             continue
         name = event["event"]
         thing = (name, *(str(cast(Message, event).get(field)) for field in DISTINCTIONS.get(name, ())))
-        left_out += kept.pop(thing, None) is not None
-        kept[thing] = event
-    return list(kept.values()), left_out
+        left_out += retained.pop(thing, None) is not None
+        retained[thing] = event
+    return list(retained.values()), left_out
 
 
 def stands(status: Message) -> bool:

@@ -19,8 +19,8 @@ from .process import driving
 
 def drive_again(t, rig, client, seconds=8):
     """Both wheels are online, reset is accepted, nothing moves without a command, and it drives."""
-    heard = rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"] and s["bus"]["state"] == "active", seconds)
-    if not t.check(heard, f"online again: {client.request('status')['bus']}"):
+    online_again = rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"] and s["bus"]["state"] == "active", seconds)
+    if not t.check(online_again, f"online again: {client.request('status')['bus']}"):
         return
     wait_reset(t, client)
     t.arm(client)
@@ -118,18 +118,18 @@ def error_flood(t, errors, active):
     t.judge(rig)
 
 
-def tell(words):
+def control(words):
     return lambda rig: rig.sim.ask(words)
 
 
 @scenario("bus-off in motion: stop, latched, reported; restarted: reset, drives again", 8)
 def row16_bus_off(t):
-    bus_off(t, tell("busoff on"), tell("busoff off"))
+    bus_off(t, control("busoff on"), control("busoff off"))
 
 
 @scenario("bus-off while listening: an event, arm refused, nothing sent", 5)
 def row16_bus_off_listening(t):
-    bus_off_listening(t, tell("busoff on"), tell("busoff off"))
+    bus_off_listening(t, control("busoff on"), control("busoff off"))
 
 
 def forged_end(t, forge):
@@ -168,12 +168,12 @@ def row16_bus_off_forged_twice(t):
 
 @scenario("error passive in motion: shown, it drives on; active again: shown", 5)
 def row16_error_passive(t):
-    error_passive(t, tell("passive on"), tell("passive off"))
+    error_passive(t, control("passive on"), control("passive off"))
 
 
 @scenario("a flood of error frames: it drives on, the log is rate-limited", 6)
 def row16_error_flood(t):
-    error_flood(t, lambda rig, number: rig.sim.ask(f"passive {'off' if number % 2 else 'on'}"), tell("passive off"))
+    error_flood(t, lambda rig, number: rig.sim.ask(f"passive {'off' if number % 2 else 'on'}"), control("passive off"))
 
 
 # Row 17: no node acknowledges, or the bus accepts nothing ----------------------------------------------------------------

@@ -128,9 +128,9 @@ def press_contact(t, rig, client, number):
     time.sleep(0.1)
     stream.stop()
     t.stopped_by(client, "estop_line")
-    told = client.request("status")["estop"]
+    reported = client.request("status")["estop"]
     at = "line" if number == 1 else "line2"
-    t.check(told["state"] == "pressed" and told["pressed_at"] == at, f"pressed at {at}: {told}")
+    t.check(reported["state"] == "pressed" and reported["pressed_at"] == at, f"pressed at {at}: {reported}")
     t.expect(client.request("reset"), "estop_pressed")
 
 
@@ -155,8 +155,8 @@ def row13_contact_stuck(t):
     rig, client = two_contacts(t)
     for number in (1, 2):
         press_contact(t, rig, client, number)
-        told = rig.wait_status(client, lambda s: s["estop"]["state"] == "disagrees", 3)
-        t.check(told and "estop_disagrees" in told["present"], f"reported: {told and told['present']}")
+        reported = rig.wait_status(client, lambda s: s["estop"]["state"] == "disagrees", 3)
+        t.check(reported and "estop_disagrees" in reported["present"], f"reported: {reported and reported['present']}")
         rig.sim.ask(f"contact {number} release")
         time.sleep(1.2)
         t.expect(client.request("reset"), "cause_present")

@@ -73,10 +73,10 @@ def row22_blocked(t):
     t.judge(rig)
 
 
-def alone(t, fault, cure, within_ms, kind):
+def alone(t, fault, undo, within_ms, kind):
     """The right wheel alone does not follow its command: the pair stops, and does not latch."""
     rig, client, why = fault_while_driving(t, fault, "pair_diverges", within_ms, kind=kind, state="stopping", side="right")
-    rig.sim.ask(cure)
+    rig.sim.ask(undo)
     largest = client.request("status")["pair"]
     t.check(largest["largest_mm"] >= largest["limit_mm"], f"the deviation is reported: {largest}, {why['sentence']}")
     t.figure(f"{why['detail']} mm from its path")
