@@ -288,6 +288,11 @@ class KernelTest(Test):
             self.judge_estop("from the level", self.from_level[known:], LEVEL_US)
         return judge
 
+    def overslept(self, waits):
+        """The witness has the gateway's priority; the client has a lower one, and can be late alone."""
+        if not virtual():
+            self.stalls += [(end_us, late_us) for end_us, late_us in waits if late_us > STALL_US]
+
     def judge_estop(self, name, pairs, limit_us):
         """For one kind of latency: a figure, and the limit of its 99th percentile."""
         values_ms = [latency_us / 1000 for _, latency_us in pairs]

@@ -58,6 +58,15 @@ class Witnessed(unittest.TestCase):
         return run.again("made up")[0], run.attempts
 
 
+class Overslept(unittest.TestCase):
+    def test_long_waits_of_the_client_are_stalls_in_real_time_only(self):
+        for is_virtual, stalls in ((False, [(5, 161_000)]), (True, [])):
+            test = kernel_rig.KernelTest("", None)
+            with self.subTest(is_virtual), mock.patch.dict(kernel_rig.CLOCK, virtual=is_virtual):
+                test.overslept([(1, 9_000), (5, 161_000)])
+                self.assertEqual(stalls, test.stalls)
+
+
 class Verdicts(Witnessed):
     def test_late_gateway_on_a_quiet_machine_fails_immediately(self):
         for failures in ([GAP], [REFUSED], [GAP, REFUSED], [PAIR]):

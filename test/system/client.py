@@ -29,6 +29,7 @@ class Client:
         self.number = 0
         self.lock = threading.RLock()
         self.closed = False
+        self.late = []  # Waits of the last `stream` that ended late: [(end_us, late_us)].
 
     # Lines -----------------------------------------------------------------------------------------------------------
 
@@ -113,13 +114,15 @@ class Client:
     def stream(self, left, right, seconds, every=0.05):
         """Drives for that long, with absolute deadlines. Returns the first refusal, or None."""
         begin = time.monotonic()
-        step = 0
+        step, self.late = 0, []
         while step * every < seconds:
             reply = self.drive(left, right)
             if not reply["ok"]:
                 return reply
             step += 1
-            time.sleep(max(0, begin + step * every - time.monotonic()))
+            due = max(begin + step * every, time.monotonic())
+            time.sleep(max(0, due - time.monotonic()))
+            self.late.append((now_us(), int((time.monotonic() - due) * 1e6)))
         return None
 
     def close(self, holder=False):

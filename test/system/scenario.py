@@ -97,7 +97,11 @@ class Test(Evidence):
 
     def drive_for(self, client, left, right, seconds, every=0.05):
         refusal = client.stream(left, right, seconds, every)
+        self.overslept(client.late)
         self.check(refusal is None, f"drive was refused: {refusal}")
+
+    def overslept(self, waits):
+        """Waits of the test's own client that ended late, [(end_us, late_us)]. A rig in real time counts the long ones as stalls."""
 
     def stopped_by(self, client, cause, state="latched"):
         """Checks that `why` names that cause, and that the state is `state`."""
