@@ -40,7 +40,6 @@
 #include <mutex>
 #include <string>
 #include <thread>
-#include <utility>
 #include <vector>
 
 using namespace eprosima::fastdds::dds;
@@ -68,17 +67,24 @@ static std::mutex lock;
 static bool holding = false;
 static std::vector<Datagram> held;
 
+// Returns true if one of the submessages fulfils `wanted(its bytes, bytes to the end of the message)`.
+template <typename Wanted> static bool has_part(const uint8_t *bytes, size_t size, Wanted wanted) {
+    for (size_t at = 20; at + 16 <= size;) {
+        if (wanted(bytes + at, size - at)) {
+            return true;
+        }
+        const size_t rest = (bytes[at + 1] & 1) ? bytes[at + 2] | bytes[at + 3] << 8 : bytes[at + 2] << 8 | bytes[at + 3];
+        at = (rest == 0) ? size : at + 4 + rest;
+    }
+    return false;
+}
+
 // Returns true if the bytes have a DATA of the writer that announces writers.
 static bool announces(const std::vector<uint8_t> &bytes) {
     static const uint8_t announcer[4] = {0, 0, 3, 0xC2};
-    for (size_t at = 20; at + 16 <= bytes.size();) {
-        const size_t rest = (bytes[at + 1] & 1) ? bytes[at + 2] | bytes[at + 3] << 8 : bytes[at + 2] << 8 | bytes[at + 3];
-        if (bytes[at] == 0x15 && std::memcmp(&bytes[at + 12], announcer, sizeof announcer) == 0) {
-            return true;
-        }
-        at = (rest == 0) ? bytes.size() : at + 4 + rest;
-    }
-    return false;
+    return has_part(bytes.data(), bytes.size(), [](const uint8_t *part, size_t) {
+        return part[0] == 0x15 && std::memcmp(part + 12, announcer, sizeof announcer) == 0;
+    });
 }
 
 static bool delay(int fd, const std::vector<uint8_t> &bytes, const void *to, size_t to_size) {
@@ -132,13 +138,12 @@ static int lost = 0;
 // Returns true for the first bytes with an ACKNACK that requests a sample of a writer of the application.
 static bool loses(const uint8_t *bytes, size_t size) {
     std::lock_guard<std::mutex> guard(lock);
-    for (size_t at = 20; losing && lost == 0 && at + 28 <= size;) {
-        const size_t rest = (bytes[at + 1] & 1) ? bytes[at + 2] | bytes[at + 3] << 8 : bytes[at + 2] << 8 | bytes[at + 3];
-        const bool requests = (bytes[at + 20] | bytes[at + 21] | bytes[at + 22] | bytes[at + 23]) != 0;
-        lost = (bytes[at] == 0x06 && (bytes[at + 11] == 2 || bytes[at + 11] == 3) && requests) ? 1 : 0;
-        at = (rest == 0) ? size : at + 4 + rest;
-    }
-    return losing && lost > 0 && std::exchange(losing, false);
+    const bool now = losing && has_part(bytes, size, [](const uint8_t *part, size_t left) {
+        return part[0] == 0x06 && left >= 28 && (part[11] == 2 || part[11] == 3) && (part[20] | part[21] | part[22] | part[23]) != 0;
+    });
+    losing = losing && !now;
+    lost += now ? 1 : 0;
+    return now;
 }
 
 // These replace the functions of libc: Fast DDS receives with one or the other.
