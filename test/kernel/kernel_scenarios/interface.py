@@ -368,13 +368,13 @@ def lost_echo(t, cure):
     for what, text in {"a warning": said, **told_by_the_tool(t, rig)}.items():
         t.check(f"ip link set {rig.interface} down; ip link set {rig.interface} up" in text, f"{what} names the fix: {text}")
         t.check(f"systemctl enable --now iwheel-can-restart@{rig.interface}.path" in text, f"{what} names the unit: {text}")
-    told = [e["present"] for e in observer.collect(0.1) if e["event"] == "fault" and e["cause"] == "setpoint_left"]
-    t.check(told == [True], f"the event comes: {told}")
+    reported = [e["present"] for e in observer.collect(0.1) if e["event"] == "fault" and e["cause"] == "setpoint_left"]
+    t.check(reported == [True], f"the event comes: {reported}")
     silent_us = now_us()
     cure(rig)
     back_to_driving_if_latched(t, rig, client)
-    told = [e["present"] for e in observer.collect(0.1) if e["event"] == "fault" and e["cause"] == "setpoint_left"]
-    t.check(told == [True, False], f"and ends: {told}")
+    reported = [e["present"] for e in observer.collect(0.1) if e["event"] == "fault" and e["cause"] == "setpoint_left"]
+    t.check(reported == [True, False], f"and ends: {reported}")
     t.check("still in the controller" not in " ".join(client.request("status")["warnings"]), "no warning remains")
     armed = [event.t_us for event in rig.timeline if event.kind == "arm" and event.ok and event.t_us > silent_us]
     t.rule(not [at for at, _, _ in rig.bus.setpoints(silent_us) if at < min(armed)], "nothing is sent before it is armed again")

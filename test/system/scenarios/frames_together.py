@@ -36,8 +36,8 @@ def frames_taken_together(t):
     client = rig.client()
     received = client.request("status")["counters"]["received"]
     t.check(received > frames, f"{received} frames received, {frames} were on the bus")
-    beside, _ = wakes_per_frame(rig)
-    t.check(beside <= TOGETHER, f"{beside:.2f} wakes for a frame with a client that does not watch them")
+    unwatched, _ = wakes_per_frame(rig)
+    t.check(unwatched <= TOGETHER, f"{unwatched:.2f} wakes for a frame with a client that does not watch them")
     t.arm(client)
     since_us, before = now_us(), wakes(rig.gateway)
     t.drive_for(client, 200, 200, WATCHED_S)
