@@ -39,7 +39,7 @@ class Sources:
 
     def verb_pages(self):
         """Returns the pages of the verbs in the order of the program's table."""
-        return {verb: self.read(f"app/ctl/help/{verb}.txt") for verb in re.findall(r"\{VERB\((\w+),", self.read("app/ctl/help.c"))}
+        return {verb: self.read(f"app/ctl/help/{verb}.txt") for verb in re.findall(r"^    VERB\((\w+),", self.read("app/ctl/talk/ctl.h"), re.MULTILINE)}
 
     def iwheelctl(self):
         """Returns the output of help_print() of iwheelctl."""

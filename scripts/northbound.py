@@ -31,7 +31,7 @@ import sys
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 TYPES = os.path.join("python", "src", "iwheel", "_protocol.py")
-FIELDS = os.path.join("lib", "northbound", "protocol", "src", "request_fields.h")
+FIELDS = os.path.join("lib", "northbound", "protocol", "include", "iwheel_northbound", "request_fields.h")
 PLAIN = {"integer": "int", "boolean": "bool", "text": "str"}
 
 
@@ -167,11 +167,12 @@ def python_types(description):
 # The table of the C parser -------------------------------------------------------------------------------------------
 
 FIELDS_HEADER = """// SPDX-License-Identifier: MIT
-// The requests and their fields, except cmd and id. Written by scripts/northbound.py from share/northbound.json.
+/// @file
+/// The requests and their fields, except cmd and id. Written by scripts/northbound.py from share/northbound.json.
 #ifndef IWHEEL_NORTHBOUND_REQUEST_FIELDS_H
 #define IWHEEL_NORTHBOUND_REQUEST_FIELDS_H
 
-/// Names in the order of iwn_cmd_t.
+/// Each request as in iwn_cmd_t, and its name.
 """
 KINDS = {"text": "TEXT", "boolean": "FLAG", "topic": "TOPICS", "side": "SIDE", "ledger_item": "ITEM"}
 MEMBERS = {
@@ -203,7 +204,7 @@ def c_fields(description):
             row = (name, member, c_kind(field), str(field.get("bytes", 0)), required)
             rows.setdefault(row, []).append(f"BIT({cmd.upper()})")
     fields = c_macro("IWN_REQUEST_FIELDS(ROW)", [f"ROW({', '.join(row)}, {' | '.join(bits)})" for row, bits in rows.items()])
-    names = c_macro("IWN_REQUEST_NAMES(NAME)", [f"NAME({cmd})" for cmd in description.requests])
+    names = c_macro("IWN_REQUEST_NAMES(NAME)", [f"NAME({cmd.upper()}, {cmd})" for cmd in description.requests])
     comment = "/// Name, member of iwn_request_t, kind, largest size of a text in bytes, required, requests with this field.\n"
     return f"{FIELDS_HEADER}{names}\n\n{comment}{fields}\n\n#endif\n"
 

@@ -52,7 +52,7 @@ COUNTED = {
 
 def tests():
     """Returns [(test, list)]; a `*` in a test's name replaces a variable of steps.cmake."""
-    found = re.findall(r"^ *(?:build\(|tests\(|test\((?:idle|real|beside) )(\S+) (quick|check|ci|full)", TESTS.read_text(), re.M)
+    found = re.findall(r"^ *(?:build\(|tests\(|test\((?:idle|real|waits) )(\S+) (quick|check|ci|full)", TESTS.read_text(), re.M)
     return [(re.sub(r"\$\{\w+\}", "*", name), where) for name, where in found]
 
 

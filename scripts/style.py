@@ -8,6 +8,7 @@ two valid forms does not have the form of this tree:
     sizeof x, sizeof(type_t)        parentheses only around types
     memset(...);                    mem* without (void): its result has no information
     NAME_OF_FILE_H                  ends the include guard of name_of_file.h
+    telemetry, not told             no identifier contains a word of REPLACED
 
 usage: style.py [--fix] [ROOT]      --fix writes that form
 
@@ -57,6 +58,10 @@ INCREMENT = re.compile(
 )
 SIZEOF = re.compile(r"\bsizeof\(([a-z_][\w.\->]*(?:\[[^\]\n]*\])?)\)")
 TYPE = re.compile(r"\w+_t$|(?:char|int|long|short|unsigned|float|double|bool|void)$|T$")
+# Words that are replaced in identifiers by the field's terms: telemetry, commanded, reported, printed; assumption, source, observation.
+REPLACED = re.compile(
+    r"\b\w*(?<![a-z])(?:told|untold|tells?|nobody|somebody|anew|keeper|knowledge|evidence|learnt|culprit|wish|heed)(?![a-z])\w*", re.IGNORECASE
+)
 VOID_MEM = re.compile(r"\(void\)(mem(?:set|cpy|move)\()")
 
 
@@ -182,6 +187,8 @@ def dialect_findings(path, name, fix):
     wanted = re.sub(r"\W", "_", path.name).upper()
     if path.suffix == ".h" and not (guard and guard[1].endswith(wanted)):
         yield f"{name}: the include guard must end in {wanted}"
+    for found in sorted(set(REPLACED.findall(STRING_OR_COMMENT.sub(" ", text)))):
+        yield f"{name}: {found}: use the field's term (REPLACED in scripts/style.py)"
 
 
 def main(arguments):

@@ -21,8 +21,7 @@ iwn_client_t *iwn_target_next(iwn_server_t *server, const iwn_client_t *after) {
 void iwn_target_status(iwn_server_t *server, iwn_client_t *client) {
     brd_host_client_t *const whose = (brd_host_client_t *)client;
     if (whose->owed_status) {
-        (void)IWN_REFUSE(&server->refusal, IWN_BUSY,
-                         "the answer to an earlier status still waits for the serial line; wait for it");
+        (void)IWN_REFUSE(&server->refusal, IWN_BUSY, "an earlier status still waits for the serial line; wait for it");
         iwn_server_refuse(server, client, &server->request.id);
         return;
     }
@@ -53,11 +52,10 @@ bool iwn_target_permits(iwn_server_t *server, iwn_client_t *client) {
                           "a configuration was committed: the gateway restarts with it, then arm");
     }
     return brd_pending_has_room(&self->pending, client->id, IWN_CMD_ARM) ||
-           IWN_REFUSE(&server->refusal, IWN_BUSY,
-                      "the answers to other requests still wait for the serial line; try again");
+           IWN_REFUSE(&server->refusal, IWN_BUSY, "other answers still wait for the serial line; try again");
 }
 
-void iwn_target_say_right(iwn_server_t *server) {
+void iwn_target_refuse_right(iwn_server_t *server) {
     (void)IWN_REFUSE(&server->refusal, IWN_DENIED, "this channel is for watching, stop and estop");
 }
 
@@ -72,9 +70,7 @@ bool iwn_target_is_key(iwn_server_t *server, const iwn_client_t *client, const c
 static const char *stale(const brd_host_t *self, const brd_host_client_t *client, const iwn_quote_t *quote) {
     char boot[IWN_LINE_BOOT + 1U];
     if (quote == NULL) {
-        return "it quotes no start of the board: a command that moves begins with boot, seq and t_us, which "
-               "iwheel-serial "
-               "puts there";
+        return "it has no boot, seq and t_us, which iwheel-serial adds";
     }
     if (strcmp(brd_host_boot_text(self->boot, boot), quote->boot) != 0) {
         return "it was meant for an earlier start of the board";
@@ -84,7 +80,7 @@ static const char *stale(const brd_host_t *self, const brd_host_client_t *client
     }
     if (quote->t_us > self->server.now_us || quote->t_us < client->opened_us ||
         self->server.now_us - quote->t_us > self->lease_us) {
-        return "it is older than lease_ms, or from before its channel was opened: the line or the host was held up";
+        return "it is older than lease_ms, or from before its channel was opened: line or host was late";
     }
     return NULL;
 }
@@ -233,7 +229,7 @@ void iwn_target_contradiction(iwn_server_t *server, iw_assumption_item_t item, c
     iwn_text_t text = iwn_text_begin(out_text, size);
     (void)server;
     (void)item;
-    iwn_text_add(&text, "the distance between the wheels is not that of wheels.track_mm, so a turn has no speeds; "
+    iwn_text_add(&text, "wheels.track_mm is contradicted, so a turn cannot be converted to wheel speeds; "
                         "correct it by the request config, or drive without yaw_mrad_s");
 }
 

@@ -35,15 +35,12 @@ static bool configure(brd_host_t *self, iwn_text_t *why, iwn_error_t *out_error)
     }
     *out_error = IWN_DENIED;
     if (!brd_host_is_silent(self)) {
-        iwn_text_add(
-            why,
-            "the gateway writes the configuration only while it listens and sends nothing: stop, and wait for that");
+        iwn_text_add(why, "the configuration is written only while the gateway sends nothing: stop, and wait for that");
         return false;
     }
     *out_error = IWN_INTERNAL;
     if (!brd_host_store(&self->staged)) {
-        iwn_text_add(why, "the flash did not accept it, and the old configuration stays; switch the board off and on, "
-                          "and try again");
+        iwn_text_add(why, "the flash did not accept it; the old configuration stays; switch the board off and on");
         return false;
     }
     self->has_staged = false;

@@ -59,7 +59,7 @@ static bool compare(brd_host_t *self, bool *out_same) {
 }
 
 void brd_host_write_item(brd_host_t *self, iw_assumption_item_t item, iwn_out_t *json) {
-    const iw_assumption_entry_t *const entry = &iwn_server_look(&self->server)->assumed[item];
+    const iw_assumption_entry_t *const entry = &iwn_server_snapshot(&self->server)->assumed[item];
     const brd_key_t key = brd_assumptions_key(item);
     char plain[BRD_SETTINGS_TEXT] = "yes";
     char whose[BRD_SETTINGS_TEXT];

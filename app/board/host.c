@@ -21,7 +21,7 @@ void brd_host_observe(brd_host_t *self, const iw_snapshot_t *seen) {
 static void end_client(brd_host_t *self, brd_host_client_t *client) {
     if (client->served.id != IW_CLIENT_NONE) {
         iw_gateway_disconnect(self->server.core, self->server.now_us, client->served.id);
-        brd_host_observe(self, iwn_server_look(&self->server));
+        brd_host_observe(self, iwn_server_snapshot(&self->server));
         brd_pending_forget(&self->pending, client->served.id);
         memset(client, 0, sizeof *client);
     }
@@ -116,7 +116,7 @@ static bool take_request(brd_host_t *self, const iwn_line_t *line) {
         self->quote = quoted ? &quote : NULL;
         iwn_server_request(&self->server, &client->served);
         self->quote = NULL;
-        brd_host_report_assumptions(self, iwn_server_look(&self->server));
+        brd_host_report_assumptions(self, iwn_server_snapshot(&self->server));
     } else if (!is_answer(self, json, length)) {
         iwn_server_refuse(&self->server, &client->served, &self->server.request.id);
     }

@@ -96,7 +96,7 @@ typedef struct {
     iw_time_us_t unsent_us;   ///< Last time at which bytes waited to be sent.
     brd_fault_t last_fault;   ///< As in brd_host_place_t.
     uint32_t errors;          ///< Bad lines since the start.
-    uint32_t errors_told;     ///< Bad lines that a line_error has counted.
+    uint32_t errors_reported; ///< Bad lines that a line_error has counted.
     uint32_t bitrate_hz;      ///< Bit rate of the bus.
     uint32_t sample_point_permille;
     iw_client_t last_id;

@@ -148,14 +148,14 @@ void brd_host_report_link(brd_host_t *self) {
 }
 
 void brd_host_report_fault(brd_host_t *self) {
-    if (self->errors == self->errors_told || self->server.now_us - self->error_us < BRD_HOST_ERROR_US) {
+    if (self->errors == self->errors_reported || self->server.now_us - self->error_us < BRD_HOST_ERROR_US) {
         return;
     }
     self->error_us = self->server.now_us;
     iwn_out_t json = iwn_server_begin_event(&self->server, "line_error");
     iwn_out_text(&json, "reason", iwn_line_verdict_name(self->fault));
-    iwn_out_int(&json, "count", self->errors - self->errors_told);
+    iwn_out_int(&json, "count", self->errors - self->errors_reported);
     if (put(self, CHANNEL_LINK, finish(&json), BRD_HOST_REPLY_ROOM)) {
-        self->errors_told = self->errors;
+        self->errors_reported = self->errors;
     }
 }

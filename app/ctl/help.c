@@ -37,34 +37,10 @@ static const char *item_choice(unsigned number) {
 static const char *verb_choice(unsigned number);
 
 /// The page of a verb is the file with its name in help/.
-#define VERB(name_, run_) .name = #name_, .run = (run_), .page = help_##name_
+#define ROW(name_, run_, no_json_, choice_)                                                                            \
+    {.name = #name_, .run = (run_), .page = help_##name_, .no_json = (no_json_), .choice = (choice_)},
 
-static const verb_t verbs[] = {
-    {VERB(status, verb_status)},
-    {VERB(top, verb_top), .no_json = "top draws a screen; for JSON lines: iwheelctl watch state"},
-    {VERB(web, verb_web), .no_json = "web prints an address; it has no --json"},
-    {VERB(fleet, verb_fleet), .choice = fleet_choice},
-    {VERB(watch, verb_watch), .choice = topic_choice},
-    {VERB(drive, verb_drive)},
-    {VERB(stop, verb_stop)},
-    {VERB(disarm, verb_stop)},
-    {VERB(estop, verb_estop)},
-    {VERB(reset, verb_reset)},
-    {VERB(release, verb_release)},
-    {VERB(tare, verb_tare), .choice = side_choice},
-    {VERB(ledger, verb_ledger)},
-    {VERB(confirm, verb_confirm), .choice = item_choice},
-    {VERB(config, verb_config), .choice = config_choice},
-    {VERB(doctor, verb_doctor)},
-    {VERB(bringup, verb_bringup), .no_json = "bringup is interactive; it has no --json (doctor has)"},
-    {VERB(why, verb_why)},
-    {VERB(record, verb_record)},
-    {VERB(decode, verb_decode)},
-    {VERB(learn, verb_learn)},
-    {VERB(replay, verb_replay)},
-    {VERB(export, verb_export), .no_json = "export writes a file; for JSON lines: iwheelctl --json decode FILE"},
-    {VERB(help, verb_help), .no_json = "help is text for people; it has no --json", .choice = verb_choice},
-};
+static const verb_t verbs[] = {CTL_VERBS(ROW)};
 #define VERBS (sizeof verbs / sizeof verbs[0])
 
 static const char *verb_choice(unsigned number) {

@@ -13,10 +13,17 @@ typedef struct {
     int count;
     bool help;
     bool version;
+    bool wrong; ///< A mistake was reported.
 } arguments_t;
 
-/// Reads an option that is allowed anywhere. Returns the number of arguments that it used; 0: it is another argument;
-/// -1 after it has reported a mistake.
+static void report_no_path(arguments_t *self) {
+    if (!self->wrong) {
+        (void)ctl_fail(CTL_USAGE, "--socket needs a path, such as --socket /run/iwheel/gateway.sock");
+    }
+    self->wrong = true;
+}
+
+/// Reads an option that is allowed anywhere. Returns the number of arguments that it used; 0: it is another argument.
 static int take_option(arguments_t *self, int left, char **argument) {
     static const char socket[] = "--socket";
     const size_t length = sizeof socket - 1U;
@@ -32,26 +39,23 @@ static int take_option(arguments_t *self, int left, char **argument) {
         self->ctl->socket = argument[1];
         return 2;
     } else if (strcmp(argument[0], socket) == 0) {
-        (void)ctl_fail(CTL_USAGE, "--socket needs a path, such as --socket /run/iwheel/gateway.sock");
-        return -1;
+        report_no_path(self);
     } else {
         return 0;
     }
     return 1;
 }
 
-/// Reads the arguments. Returns false after it has reported a mistake.
-static bool take_arguments(arguments_t *self, int count, char **arguments) {
+/// Reads the arguments, all of them also after a mistake, which it reports.
+static void take_arguments(arguments_t *self, int count, char **arguments) {
     for (int i = 1; i < count;) {
         const int used = take_option(self, count - i, &arguments[i]);
-        if (used < 0) {
-            return false;
-        }
-        if (used == 0 && self->verb == NULL && arguments[i][0] == '-') {
-            (void)ctl_fail(CTL_USAGE, "unknown option %s; see: iwheelctl --help", arguments[i]);
-            return false;
-        }
-        if (used == 0 && self->verb == NULL) {
+        if (used == 0 && self->verb == NULL && (arguments[i][0] == '-' || arguments[i][0] == '\0')) {
+            if (!self->wrong) {
+                (void)ctl_fail(CTL_USAGE, "unknown option %s; see: iwheelctl --help", arguments[i]);
+            }
+            self->wrong = true;
+        } else if (used == 0 && self->verb == NULL) {
             self->verb = arguments[i];
         } else if (used == 0) {
             self->words[self->count] = arguments[i];
@@ -60,14 +64,31 @@ static bool take_arguments(arguments_t *self, int count, char **arguments) {
         i += (used == 0) ? 1 : used;
     }
     if (self->ctl->socket != NULL && self->ctl->socket[0] == '\0') {
-        (void)ctl_fail(CTL_USAGE, "--socket needs a path, such as --socket /run/iwheel/gateway.sock");
-        return false;
+        report_no_path(self);
+        self->ctl->socket = NULL;
     }
-    return true;
+}
+
+/// Stops in spite of a mistake in the arguments if the verb is a stop. Returns an exit code.
+static int stop_anyway(const arguments_t *arguments) {
+    const verb_t *verb = (arguments->verb != NULL) ? help_find(arguments->verb) : NULL;
+    if (verb == NULL || arguments->help || arguments->version) {
+        return CTL_USAGE;
+    }
+    int code = CTL_USAGE;
+    if (verb->run == verb_stop || verb->run == verb_disarm) {
+        code = verb->run(arguments->ctl, 0, arguments->words); // Without the words: the first mistake was reported.
+    } else if (verb->run == verb_estop) {
+        code = verb_estop(arguments->ctl, arguments->count, arguments->words);
+    }
+    return (code != CTL_OK) ? code : CTL_USAGE;
 }
 
 static int dispatch(const arguments_t *arguments) {
     const verb_t *verb = (arguments->verb != NULL) ? help_find(arguments->verb) : NULL;
+    if (arguments->wrong) {
+        return stop_anyway(arguments);
+    }
     if (arguments->version) {
         (void)puts("iwheelctl " IWHEEL_VERSION);
         return CTL_OK;
@@ -92,15 +113,14 @@ static int dispatch(const arguments_t *arguments) {
 int main(int count, char **arguments) {
     static ctl_t ctl;
     arguments_t self = {.ctl = &ctl};
-    int code = begin_program("iwheelctl", count, arguments);
-    if (code != 0) {
-        return code;
-    }
+    int code = CTL_OK;
+    self.wrong = begin_program("iwheelctl", count, arguments) != 0;
     self.words = (char **)calloc((size_t)count + 1U, sizeof *self.words);
     if (!client_init(&ctl.client) || self.words == NULL) {
         code = ctl_fail(CTL_INTERNAL, "out of memory");
     } else {
-        code = take_arguments(&self, count, arguments) ? dispatch(&self) : CTL_USAGE;
+        take_arguments(&self, count, arguments);
+        code = dispatch(&self);
     }
     client_free(&ctl.client);
     free((void *)self.words);

@@ -34,7 +34,7 @@ class View:
 
     def __init__(self, plain):
         self.drawn = not plain and sys.stdout.isatty() and shutil.get_terminal_size().lines >= HEIGHT + 5
-        self.path, self.told_s, self.begin = set(), -1.0, time.monotonic()
+        self.path, self.printed_s, self.begin = set(), -1.0, time.monotonic()
         if self.drawn:
             print("\x1b[2J", end="")
 
@@ -46,8 +46,8 @@ class View:
         here = (round((x_m + 0.25) / SPAN_M * (WIDTH - 1)), round((y_m + 0.25) / SPAN_M * (HEIGHT - 1)))
         self.path.add(here)
         if not self.drawn:
-            if time.monotonic() - self.told_s > 1.0:
-                self.told_s = time.monotonic()
+            if time.monotonic() - self.printed_s > 1.0:
+                self.printed_s = time.monotonic()
                 self.show(text)
             return
         arrow = ">/^\\<,v`"[round(math.degrees(yaw) / 45) % 8]

@@ -53,9 +53,9 @@ typedef struct {
     iw_time_us_t suspended_us; ///< Suspended time of the machine, as last read.
     iw_time_us_t clocks_us;    ///< Next time to read both clocks without lateness.
     iw_time_us_t awaited_us;   ///< Latest end of the last wait.
-    iw_time_us_t look_us;      ///< Next time to read bus and e-stop without a wake-up.
+    iw_time_us_t poll_us;      ///< Next time to read bus and e-stop without a wake-up.
     iw_time_us_t frames_us;    ///< Last time at which frames were read.
-    iw_time_us_t box_look_us;  ///< Next time to poll the writer of the black box.
+    iw_time_us_t box_poll_us;  ///< Next time to poll the writer of the black box.
     iw_time_us_t mark_us;      ///< Next attempt to change the crash marker after a failure; 0 if none failed.
     uint32_t silent_pairs;     ///< Setpoint pairs sent up to the last pause.
 } gw_loop_t;

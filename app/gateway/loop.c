@@ -19,13 +19,13 @@
 
 /// While setpoints are sent, bus and e-stop are read at this interval even without a wake-up, because a GPIO chip that
 /// disappears causes none. While a setpoint waits for its echo, the interval is shorter.
-#define LOOK_US      3000U
-#define ECHO_LOOK_US 1000U
+#define POLL_US      3000U
+#define ECHO_POLL_US 1000U
 /// The same interval while nothing is sent, if frames wait.
-#define REST_LOOK_US 6000U
+#define REST_POLL_US 6000U
 /// After this time without frames the bus wakes the loop again, so that the loop does not poll without need.
 #define FRAMES_GONE_US 20000U
-#define BOX_LOOK_US    100000U
+#define BOX_POLL_US    100000U
 /// After a lateness of this size the machine may have been suspended.
 #define ASLEEP_US 500U
 /// Interval of reading both clocks in any case.
@@ -107,8 +107,8 @@ static void give_way(gw_daemon_t *daemon) {
     const gw_holder_t *holder = &daemon->runtime.lock.holder;
     if (daemon->loop.phase == GW_LOOP_SERVES && gw_bus_lock_poll(&daemon->runtime.lock, daemon->wheels.now_us)) {
         sock_log(&daemon->log, SOCK_LOG_WARNING,
-                 "a gateway of user %u (process %ld) serves %s now and goes before this one: stopping the wheels, then "
-                 "ending",
+                 "a gateway of user %u (process %ld) serves %s now and has priority over this one: stopping the "
+                 "wheels, then ending",
                  (unsigned)holder->uid, (long)holder->pid, daemon->config.bus.interface);
         shut_down(daemon, GW_LOOP_GIVES_WAY);
     }
@@ -135,11 +135,10 @@ static void mark_if_sending(gw_daemon_t *daemon, const iw_snapshot_t *seen) {
         return;
     }
     if (daemon->loop.mark_us == 0U) {
-        sock_log(
-            &daemon->log, SOCK_LOG_WARNING,
-            "cannot change the crash marker %s: %s; until that works the wheels would follow their last command for a "
-            "second after a crash",
-            daemon->runtime.marker_path, strerror(errno));
+        sock_log(&daemon->log, SOCK_LOG_WARNING,
+                 "cannot change the crash marker %s: %s; until this is fixed, the wheels would follow their last "
+                 "command for a second after a crash; check owner and free space of the directory",
+                 daemon->runtime.marker_path, strerror(errno));
     }
     daemon->loop.mark_us = daemon->wheels.now_us + MARK_AGAIN_US;
 }
@@ -176,9 +175,9 @@ static void plan_poll(gw_daemon_t *daemon, const iw_snapshot_t *seen) {
     gw_loop_t *loop = &daemon->loop;
     loop->pace = pace_of(daemon, seen);
     const bool echo_waits = loop->pace == GW_PACE_DRIVING && seen->waiting_us != IW_NEVER;
-    loop->look_us = (loop->pace == GW_PACE_RESTING)
-                        ? seen->at_us + REST_LOOK_US
-                        : evenly(seen->at_us, daemon->wheels.step_us, echo_waits ? ECHO_LOOK_US : LOOK_US);
+    loop->poll_us = (loop->pace == GW_PACE_RESTING)
+                        ? seen->at_us + REST_POLL_US
+                        : evenly(seen->at_us, daemon->wheels.step_us, echo_waits ? ECHO_POLL_US : POLL_US);
 }
 
 /// Reads one clock, in which a suspend appears as lateness. Reads both after a lateness, and periodically.
@@ -226,7 +225,7 @@ static iw_time_us_t next_us(gw_daemon_t *daemon) {
     next_us = earlier(next_us, gw_answers_next_us(&daemon->answers));
     next_us = earlier(next_us, gw_answers_frames_us(&daemon->answers));
     next_us = earlier(next_us, sock_service_next_us(&daemon->clients));
-    return polls(daemon) ? earlier(next_us, daemon->loop.look_us) : next_us;
+    return polls(daemon) ? earlier(next_us, daemon->loop.poll_us) : next_us;
 }
 
 /// Sets whether the bus wakes the loop. Frames that arrive regularly may wait, unless a client watches them.
@@ -255,18 +254,14 @@ static bool note_event(gw_daemon_t *daemon, const struct epoll_event *event) {
     case SOCK_TAG_WATCH_LISTENER:
         return true;
     case SOCK_TAG_BOX:
-        daemon->loop.box_look_us = 0;
+        daemon->loop.box_poll_us = 0;
         return false;
     case SOCK_TAG_BUS: // Read in every cycle.
     case SOCK_TAG_ESTOP:
         return false;
-    default: {
-        sock_client_t *client = &daemon->clients.client[event->data.u64 - SOCK_TAG_CLIENT];
-        client->readable = (event->events & (EPOLLIN | EPOLLRDHUP)) != 0U;
-        client->leaving = client->leaving || (event->events & (EPOLLRDHUP | EPOLLHUP | EPOLLERR)) != 0U;
-        client->hung_up = (event->events & (EPOLLHUP | EPOLLERR)) != 0U;
+    default:
+        sock_service_note(&daemon->clients, event);
         return false;
-    }
     }
 }
 
@@ -276,8 +271,8 @@ static bool has_come_to_rest(const gw_daemon_t *daemon) {
 
 /// Receives from the writer after an event, or periodically if the writer was restarted.
 static void listen_to_writer(gw_daemon_t *daemon) {
-    if (daemon->wheels.now_us >= daemon->loop.box_look_us) {
-        daemon->loop.box_look_us = daemon->wheels.now_us + BOX_LOOK_US;
+    if (daemon->wheels.now_us >= daemon->loop.box_poll_us) {
+        daemon->loop.box_poll_us = daemon->wheels.now_us + BOX_POLL_US;
         gw_record_take(&daemon->box, &daemon->log);
         if (!gw_recordings_take(&daemon->answers)) {
             sock_log(&daemon->log, SOCK_LOG_WARNING,
@@ -310,13 +305,13 @@ static void execute_first_and_step(gw_daemon_t *daemon, iwl_reported_t woken) {
     step(daemon);
 }
 
-static void cycle(gw_daemon_t *daemon, bool somebody_knocks) {
+static void cycle(gw_daemon_t *daemon, bool client_waits) {
     sock_service_clients(&daemon->clients, daemon->loop.holder);
     if (daemon->wheels.requested) {
         read_clock(daemon);
         step(daemon); // A new command is sent immediately.
     }
-    if (somebody_knocks) {
+    if (client_waits) {
         sock_service_accept(&daemon->clients);
     }
     listen_to_writer(daemon);
@@ -340,18 +335,18 @@ int gw_loop_run(gw_daemon_t *daemon) {
         if (count < 0 && errno != EINTR) {
             return errno;
         }
-        bool somebody_knocks = false;
+        bool client_waits = false;
         // An interrupted wait has no result.
         iwl_reported_t woken = {.bus = count < 0, .estop = count < 0};
         read_clock(daemon);
         daemon->clients.now_us = daemon->wheels.now_us;
         for (int i = 0; i < count; i++) {
-            somebody_knocks = note_event(daemon, &events[i]) || somebody_knocks;
+            client_waits = note_event(daemon, &events[i]) || client_waits;
             woken.bus = woken.bus || events[i].data.u64 == SOCK_TAG_BUS;
             woken.estop = woken.estop || events[i].data.u64 == SOCK_TAG_ESTOP;
         }
         execute_first_and_step(daemon, woken);
-        cycle(daemon, somebody_knocks);
+        cycle(daemon, client_waits);
         if (!ready) {
             ready = true;
             gw_notify_ready(&daemon->notify);

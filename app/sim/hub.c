@@ -65,7 +65,7 @@ static void send_to_others(sim_hub_t *self, const sim_client_t *from, const iw_c
     }
 }
 
-void sim_hub_tell(sim_hub_t *self, const iw_can_frame_t *error_frame) {
+void sim_hub_report(sim_hub_t *self, const iw_can_frame_t *error_frame) {
     send_to_others(self, NULL, error_frame);
 }
 

@@ -40,7 +40,7 @@ void sim_hub_close(sim_hub_t *self);
 void sim_hub_deliver(sim_hub_t *self, const sim_delivery_t *delivery);
 
 /// Sends all clients an error frame that reports the state of their controllers.
-void sim_hub_tell(sim_hub_t *self, const iw_can_frame_t *error_frame);
+void sim_hub_report(sim_hub_t *self, const iw_can_frame_t *error_frame);
 
 /// Sets the interface down (all connections are closed, new ones are rejected) or up.
 void sim_hub_down(sim_hub_t *self, bool down);

@@ -8,7 +8,7 @@
 #define PULSE_MAX_milli_ms 60000000
 #define STATUS_BYTES       4096U
 /// Value of an absent argument.
-#define UNTOLD INT64_MIN
+#define OMITTED INT64_MIN
 /// Value of `once`; on and off are 1 and 0.
 #define BUT_ONCE 2
 
@@ -17,7 +17,7 @@ typedef const char *result_t;
 static void report(const sim_call_t *call, sim_error_t error) {
     if (call->panel->hooks.hub != NULL) {
         iw_can_frame_t const frame = sim_hub_error_frame(error);
-        sim_hub_tell(call->panel->hooks.hub, &frame);
+        sim_hub_report(call->panel->hooks.hub, &frame);
     }
 }
 
@@ -58,10 +58,10 @@ static result_t set_queue(const sim_call_t *call) {
 static result_t set_foreign(const sim_call_t *call) {
     sim_foreign_t *const foreign = &call->world->foreign;
     const bool off = call->value[0] == 0;
-    if (call->value[1] != UNTOLD && off) {
+    if (call->value[1] != OMITTED && off) {
         return SIM_USAGE;
     }
-    if (call->value[1] != UNTOLD) {
+    if (call->value[1] != OMITTED) {
         foreign->setpoint.speed_mm_s = (int16_t)call->value[1];
     }
     if (call->value[0] == BUT_ONCE) {
@@ -120,11 +120,11 @@ static result_t obey_all(const action_t *config, const sim_hooks_t *hooks) {
     return (result == NULL && hooks->second != NULL) ? obey(config, hooks->second) : result;
 }
 
-/// Reads the action. Returns false if it does not exist. `span` is the duration of a pulse in us, or UNTOLD.
+/// Reads the action. Returns false if it does not exist. `span` is the duration of a pulse in us, or OMITTED.
 static bool read_action(const sim_call_t *call, const char *action, int64_t span, action_t *out_config) {
     *out_config = (action_t){.pulses = strcmp(action, "pulse") == 0, .until_us = call->now_us + (iw_time_us_t)span};
     out_config->plug = sim_words_choice(action, (sim_choice_t){"unplug", "plug"}, &out_config->on);
-    return out_config->pulses == (span != UNTOLD) &&
+    return out_config->pulses == (span != OMITTED) &&
            (out_config->pulses || out_config->plug ||
             sim_words_choice(action, (sim_choice_t){"press", "release"}, &out_config->on));
 }
@@ -190,8 +190,8 @@ static result_t quit(const sim_call_t *call) {
 
 #define WORD   .kind = SIM_WORD
 #define SWITCH .kind = SIM_CHOICE, .word = "on", .other = "off", .also = "once", .value = BUT_ONCE
-#define SPEED  .kind = SIM_WHOLE, .range = {INT16_MIN, INT16_MAX}, .optional = true, .value = UNTOLD
-#define PULSE  .kind = SIM_MILLI, .range = {100, PULSE_MAX_milli_ms}, .optional = true, .value = UNTOLD
+#define SPEED  .kind = SIM_WHOLE, .range = {INT16_MIN, INT16_MAX}, .optional = true, .value = OMITTED
+#define PULSE  .kind = SIM_MILLI, .range = {100, PULSE_MAX_milli_ms}, .optional = true, .value = OMITTED
 
 const sim_command_t sim_bus_commands[] = {
     {ONCE("ack", set_ack, {ON_OFF})},

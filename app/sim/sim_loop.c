@@ -119,7 +119,7 @@ static bool make_room(const char *path, int type, sim_reason_t *out_reason) {
     return unlink(path) == 0 || refuse(out_reason, path, strerror(errno));
 }
 
-static void somebody_connects(sim_watch_t *watch) {
+static void accept_watcher(sim_watch_t *watch) {
     sim_listener_t *const self = watch->owner;
     const int fd = (watch->fd >= 0) ? accept4(watch->fd, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC) : -1;
     if (fd >= 0 && !self->admit(self->owner, fd)) {
@@ -147,7 +147,7 @@ static int listen_at(const struct sockaddr_un *address, int type, struct stat *o
 bool sim_listener_open(sim_listener_t *self, const char *path, int type, sim_reason_t *out_reason) {
     struct sockaddr_un address;
     struct stat made = {0};
-    self->watch = (sim_watch_t){somebody_connects, self, -1};
+    self->watch = (sim_watch_t){accept_watcher, self, -1};
     if (!fill_address(&address, path)) {
         return refuse(out_reason, path, "the path of a unix socket has 1 to 107 characters; choose a shorter one");
     }

@@ -15,7 +15,7 @@
 #define MESSAGE_BYTES 1024U
 
 /// Prints a line, unless standard output cannot accept it now: a full pipe must not delay the wheels.
-__attribute__((format(printf, 2, 3))) static void say(const sim_simulator_t *self, const char *format, ...) {
+__attribute__((format(printf, 2, 3))) static void print(const sim_simulator_t *self, const char *format, ...) {
     char text[MESSAGE_BYTES];
     struct pollfd out = {.fd = STDOUT_FILENO, .events = POLLOUT};
     if (self->quiet || poll(&out, 1U, 0) != 1 || (out.revents & POLLOUT) == 0) {
@@ -65,7 +65,7 @@ static const char *execute(void *context, const char *line) {
     }
     if (sim_panel_execute(&self->panel, self->now_us, line) == SIM_CHANGED) {
         mark(self, line);
-        say(self, "%s", line);
+        print(self, "%s", line);
     }
     return self->panel.answer;
 }
@@ -125,17 +125,17 @@ static void awake(void *context) {
         iw_time_us_t const pause_us = now_us - self->wake_us;
         self->skipped_us += pause_us;
         now_us -= pause_us;
-        say(self, "this process was stopped for %" PRIu64 " ms, and the wheels with it", pause_us / IW_US_PER_MS);
+        print(self, "this process was stopped for %" PRIu64 " ms, and the wheels with it", pause_us / IW_US_PER_MS);
     }
     self->now_us = now_us;
     catch_up(self);
     if (sim_socketcan_step(&self->can, now_us)) {
-        say(self, "the interface is %s", interface_state(self->can.state));
+        print(self, "the interface is %s", interface_state(self->can.state));
     }
     const bool second_ends = sim_button_step(&self->second, now_us);
     if (sim_button_step(&self->button, now_us) || second_ends) {
         mark(self, "estop release");
-        say(self, "estop release (end of the pulse)");
+        print(self, "estop release (end of the pulse)");
     }
     for (;;) {
         const char *const command = sim_script_take(&self->script, now_us - self->start_us);
@@ -144,7 +144,7 @@ static void awake(void *context) {
         }
         const char *const answer = execute(self, command);
         if (answer[0] == 'e') {
-            say(self, "script: %s: %.*s", command, (int)strcspn(answer, "\n"), answer);
+            print(self, "script: %s: %.*s", command, (int)strcspn(answer, "\n"), answer);
         }
     }
 }
@@ -168,7 +168,7 @@ void sim_simulator_run(sim_simulator_t *self) {
         iw_time_us_t const world_us = (self->wake_us == IW_NEVER) ? IW_NEVER : real_us(self, self->wake_us);
         sim_loop_wait(&self->loop, earlier(world_us, log_us), awake, self);
     }
-    say(self, "ended");
+    print(self, "ended");
 }
 
 static void signalled(sim_watch_t *watch) {
@@ -230,14 +230,14 @@ static int system_refuses(const char *what) {
 }
 
 static void greet(sim_simulator_t *self, const sim_options_t *options) {
-    say(self, "two simulated wheels, seed %" PRIu64 "; end with Ctrl-C", options->seed);
-    say(self, "start the gateway with: --can %s%s --estop unix:%s",
-        self->on_socketcan ? "" : "unix:", self->on_socketcan ? options->can_interface : options->can_path,
-        options->estop_path);
+    print(self, "two simulated wheels, seed %" PRIu64 "; end with Ctrl-C", options->seed);
+    print(self, "start the gateway with: --can %s%s --estop unix:%s",
+          self->on_socketcan ? "" : "unix:", self->on_socketcan ? options->can_interface : options->can_path,
+          options->estop_path);
     if (options->estop2_path[0] != '\0') {
-        say(self, "its configuration: [estop] line2 = unix:%s", options->estop2_path);
+        print(self, "its configuration: [estop] line2 = unix:%s", options->estop2_path);
     }
-    say(self, "commands: iwheel-sim --control %s help", options->control_path);
+    print(self, "commands: iwheel-sim --control %s help", options->control_path);
 }
 
 int sim_simulator_open(sim_simulator_t *self, const sim_options_t *options) {

@@ -76,7 +76,3 @@ void iw_assumption_contradict(iw_assumption_store_t *self, iw_assumption_item_t 
     const iw_assumption_entry_t next = {IW_CONTRADICTED, source, figure};
     change(self, item, &next);
 }
-
-const iw_assumption_entry_t *iw_assumption_entry(const iw_assumption_store_t *self, iw_assumption_item_t item) {
-    return &self->entry[item];
-}

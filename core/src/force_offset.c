@@ -39,7 +39,7 @@ void iw_force_init(iw_force_t *self, iw_force_unit_t unit) {
 void iw_force_reopen(iw_force_t *self, bool boot_seen) {
     self->boot_seen = boot_seen;
     self->count = 0;
-    self->wheel_offset_heard = false;
+    self->wheel_offset_received = false;
     self->observation = IW_UNIT_UNKNOWN;
     self->observed_permille = 0;
     memset(&self->quality, 0, sizeof self->quality);
@@ -155,7 +155,7 @@ static iw_unit_observation_t weigh(int32_t mean_raw, int32_t offset_dN) {
 static void judge_unit(iw_force_t *self) {
     const int32_t offset_dN = self->wheel_offset_dN;
     const int32_t mean_raw = self->quality.mean_mN / scale_mN(self);
-    if (!self->wheel_offset_heard || self->quality.window != IW_WINDOW_GOOD) {
+    if (!self->wheel_offset_received || self->quality.window != IW_WINDOW_GOOD) {
         return;
     }
     if (iw_abs(offset_dN) >= IW_FORCE_OBSERVED_MIN_dN) {
@@ -171,7 +171,7 @@ static void judge_unit(iw_force_t *self) {
 static void settle(iw_force_t *self, iw_time_us_t now_us) {
     const bool trusted = !self->boot_seen || self->quality.window == IW_WINDOW_GOOD;
     judge_unit(self);
-    if (self->wheel_offset_heard && trusted && self->provenance < IW_OFFSET_OPERATOR) {
+    if (self->wheel_offset_received && trusted && self->provenance < IW_OFFSET_OPERATOR) {
         adopt(self, now_us, IW_OFFSET_WHEEL, self->wheel_offset_dN * 100);
     }
 }
@@ -212,7 +212,7 @@ void iw_force_receive(iw_force_t *self, iw_time_us_t now_us, int16_t raw, bool s
 
 void iw_force_receive_offset(iw_force_t *self, iw_time_us_t now_us, int16_t offset_dN) {
     self->wheel_offset_dN = offset_dN;
-    self->wheel_offset_heard = true;
+    self->wheel_offset_received = true;
     settle(self, now_us);
 }
 

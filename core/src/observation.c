@@ -34,7 +34,7 @@ static void contradict(iw_gateway_t *gateway, iw_assumption_item_t item, int32_t
 /// Adds the turn since the last speed message. A gap, a slow wheel or a new direction ends the stretch.
 static void add_turn(iw_observation_wheel_t *self, const iw_snapshot_wheel_t *wheel) {
     const iw_time_us_t elapsed_us = wheel->speed_us - self->speed_us;
-    const int16_t rpm = wheel->told->speed.speed_rpm;
+    const int16_t rpm = wheel->telemetry->speed.speed_rpm;
     const bool steady = rpm * self->rpm >= IW_OBSERVATION_RPM * IW_OBSERVATION_RPM;
     if (elapsed_us > IW_OBSERVATION_GAP_US || !steady || self->turned > IW_OBSERVATION_TURNED_MAX) {
         self->open = false;
@@ -153,7 +153,7 @@ static void judge_pose(iw_observation_t *self, iw_gateway_t *gateway, const iw_s
 
 static void check_pose(iw_observation_t *self, iw_gateway_t *gateway, const iw_snapshot_t *seen) {
     const iw_codec_pose_t was = self->pose;
-    const iw_codec_pose_t is = seen->wheel[IW_RIGHT].told->pose;
+    const iw_codec_pose_t is = seen->wheel[IW_RIGHT].telemetry->pose;
     const iw_codec_pose_t was_reversed = reversed_pose(&was);
     const iw_codec_pose_t is_reversed = reversed_pose(&is);
     const int32_t step = pose_step(&was, &is);

@@ -52,7 +52,7 @@ iw_force_validity_t iw_snapshot_force_validity(const iw_snapshot_t *self, iw_sid
 static void read_wheel(const iw_gateway_t *self, iw_time_us_t now_us, iw_side_t side, iw_snapshot_wheel_t *out_wheel) {
     const iw_wheel_t *const wheel = &self->wheel[side];
     const uint32_t rest_us = iw_wheel_rest_us(wheel, now_us); // More than 0 only if the wheel is online.
-    out_wheel->told = &self->told[side];
+    out_wheel->telemetry = &self->telemetry[side];
     out_wheel->force = &self->force[side];
     out_wheel->speed_us = wheel->speed_us;
     out_wheel->status_us = wheel->status_us;

@@ -24,15 +24,6 @@ static uint8_t side_bit(size_t side) {
     return (uint8_t)(IW_SIDES_LEFT << side);
 }
 
-/// Returns true if a wheel is lost. In a stalled step it judges at `promised_us`: a wheel that was lost before the
-/// stall remains lost.
-static void excuse_wheel(iw_gateway_t *self, iw_side_t side) {
-    if (!iw_wheel_lost(&self->wheel[side], self->promised_us)) {
-        iw_wheel_excuse(&self->wheel[side], self->now_us);
-    }
-    iw_follow_restart(&self->follow[side]);
-}
-
 /// Returns the lateness of the step, at most UINT32_MAX. A suspend of the system counts, because the clock may stop
 /// while the wheels do not.
 static uint32_t read_lateness(iw_gateway_t *self) {
@@ -57,8 +48,7 @@ static void watch_loop(iw_gateway_t *self) {
     }
     if (late) {
         self->counters.late_steps++;
-        excuse_wheel(self, IW_LEFT);
-        excuse_wheel(self, IW_RIGHT);
+        iw_watch_excuse(self);
     }
     const uint32_t run_us = iw_age_us(self->stalled_since_us, self->now_us);
     const uint32_t blind_us = (run_us > late_us) ? run_us : late_us;
@@ -109,7 +99,7 @@ static void note_force_observation(iw_gateway_t *self, iw_side_t side) {
 }
 
 static void receive_force(iw_gateway_t *self, iw_codec_kind_t kind, iw_side_t side) {
-    const iw_codec_wheel_t *const values = &self->told[side];
+    const iw_codec_wheel_t *const values = &self->telemetry[side];
     iw_force_t *const force = &self->force[side];
     const iw_unit_observation_t before = force->observation;
     if (kind == IW_CODEC_FORCE) {
@@ -148,7 +138,7 @@ static void receive_telemetry(iw_gateway_t *self, iw_codec_kind_t kind, iw_side_
     iw_wheel_t *const wheel = &self->wheel[side];
     const bool first = wheel->first_us == IW_NEVER;
     self->counters.received++;
-    iw_wheel_receive(wheel, self->now_us, kind, &self->told[side], !self->stalled);
+    iw_wheel_receive(wheel, self->now_us, kind, &self->telemetry[side], !self->stalled);
     const iw_reboot_t reboot = iw_wheel_next_reboot(wheel);
     if (reboot != IW_REBOOT_NONE) {
         raise_cause(self, IW_CAUSE_WHEEL_REBOOTED, side_bit(side), (uint32_t)reboot);
@@ -192,7 +182,7 @@ static void receive_frame(iw_gateway_t *self, const iw_can_frame_t *frame) {
         receive_setpoint(self, side, frame);
         return;
     }
-    const iw_codec_kind_t kind = iw_codec_decode(frame, self->told);
+    const iw_codec_kind_t kind = iw_codec_decode(frame, self->telemetry);
     switch (kind) {
     case IW_CODEC_BAD_FORMAT:
         self->counters.bad_format++;
@@ -323,9 +313,7 @@ static IW_APART void watch_rolling(iw_gateway_t *self) {
 
 /// Returns the time for which both wheels have been at standstill; 0 if one turns. Both wheels must be online.
 static uint32_t both_rest_us(const iw_gateway_t *self) {
-    const iw_time_us_t left_us = self->wheel[IW_LEFT].rest_since_us;
-    const iw_time_us_t right_us = self->wheel[IW_RIGHT].rest_since_us;
-    const iw_time_us_t since_us = (left_us > right_us) ? left_us : right_us;
+    const iw_time_us_t since_us = iw_later(self->wheel[IW_LEFT].rest_since_us, self->wheel[IW_RIGHT].rest_since_us);
     return (since_us == IW_NEVER) ? 0U : iw_age_us(since_us, self->now_us);
 }
 
@@ -421,21 +409,22 @@ static void send_due(iw_gateway_t *self) {
     }
 }
 
-static iw_time_us_t sooner(iw_time_us_t a, iw_time_us_t b) {
-    return (a < b) ? a : b;
-}
-
-/// Returns the time of the next call, at most one period from now.
-static iw_time_us_t next_step_us(const iw_gateway_t *self) {
+/// Returns the time of the next call, at most one period from now. If both wheels stop sending, no frame causes a step
+/// when they are offline, so that time counts too. One wheel that still sends causes the steps.
+static IW_APART iw_time_us_t next_step_us(const iw_gateway_t *self) {
     const iw_time_us_t due_us = iw_setpoint_next_us(&self->setpoint);
+    const iw_time_us_t offline_us = iw_watch_both_offline_us(self);
     iw_time_us_t next_us =
-        sooner(self->now_us + (iw_time_us_t)self->config.period_ms * IW_US_PER_MS, iw_permit_next_us(&self->permit));
+        iw_sooner(self->now_us + (iw_time_us_t)self->config.period_ms * IW_US_PER_MS, iw_permit_next_us(&self->permit));
     if (self->backlog) {
         return self->now_us;
     }
     // A pair that is overdue could not be sent (no echo yet, bus down). Returning a past time would cause a busy loop.
     if (due_us > self->now_us) {
-        next_us = sooner(next_us, due_us);
+        next_us = iw_sooner(next_us, due_us);
+    }
+    if (offline_us > self->now_us) {
+        next_us = iw_sooner(next_us, offline_us);
     }
     return (next_us > self->now_us) ? next_us : self->now_us;
 }

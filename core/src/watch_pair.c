@@ -5,7 +5,7 @@
 #include "iwheel/gateway.h"
 
 int32_t iw_watch_own_mm_s(const iw_gateway_t *self, size_t side) {
-    const int32_t speed_um_s = self->told[side].speed.speed_rpm * self->diverge.um_s_per_rpm;
+    const int32_t speed_um_s = self->telemetry[side].speed.speed_rpm * self->diverge.um_s_per_rpm;
     return (self->config.invert[side] ? -speed_um_s : speed_um_s) / 1000;
 }
 
@@ -37,4 +37,28 @@ void iw_watch_pair(iw_gateway_t *self, const iw_pair_t *applied, bool online) {
     } else {
         compare(self, applied);
     }
+}
+
+iw_time_us_t iw_watch_both_offline_us(const iw_gateway_t *self) {
+    return iw_later(self->wheel[IW_LEFT].received_until_us, self->wheel[IW_RIGHT].received_until_us);
+}
+
+/// Returns the last time before a stall at which a wheel can have been lost. If the step was promised for the limit of
+/// both wheels, the stall can have begun with the last frame of either of them, so neither was lost before.
+static iw_time_us_t judged_us(const iw_gateway_t *self) {
+    const bool at_limit = iw_watch_both_offline_us(self) == self->promised_us;
+    return at_limit ? self->promised_us - IW_WHEEL_SPEED_PERIOD_US : self->promised_us;
+}
+
+static void excuse(iw_gateway_t *self, iw_side_t side, iw_time_us_t before_us) {
+    if (!iw_wheel_lost(&self->wheel[side], before_us)) {
+        iw_wheel_excuse(&self->wheel[side], self->now_us);
+    }
+    iw_follow_restart(&self->follow[side]);
+}
+
+void iw_watch_excuse(iw_gateway_t *self) {
+    const iw_time_us_t before_us = judged_us(self);
+    excuse(self, IW_LEFT, before_us);
+    excuse(self, IW_RIGHT, before_us);
 }

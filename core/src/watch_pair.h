@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// The rule of the pair in a step of the gateway: conditions of the comparison, and the reaction.
+/// Rules of the pair in a step of the gateway: the comparison with its conditions and reaction, and common silence.
 #ifndef IW_WATCH_PAIR_H
 #define IW_WATCH_PAIR_H
 
@@ -13,5 +13,12 @@ int32_t iw_watch_own_mm_s(const struct iw_gateway *self, size_t side);
 /// Compares the pair. `applied`: the present pair. `online`: both wheels are online. It compares nothing while no
 /// setpoint is sent, while zeros are sent, or after zero without ramp: the wheels then roll or brake on their own.
 void iw_watch_pair(struct iw_gateway *self, const iw_pair_t *applied, bool online);
+
+/// Returns the time at which both wheels are offline if neither sends another speed message.
+iw_time_us_t iw_watch_both_offline_us(const struct iw_gateway *self);
+
+/// Excuses both wheels in a stalled step: their silence counts from now. A wheel that was lost before the stall remains
+/// lost.
+void iw_watch_excuse(struct iw_gateway *self);
 
 #endif

@@ -128,8 +128,7 @@ void iw_wheel_excuse(iw_wheel_t *self, iw_time_us_t now_us) {
 }
 
 bool iw_wheel_lost(const iw_wheel_t *self, iw_time_us_t now_us) {
-    const iw_time_us_t since_us = (self->received_us > self->excused_us) ? self->received_us : self->excused_us;
-    return iw_age_us(since_us, now_us) >= silent_us(self);
+    return iw_age_us(iw_later(self->received_us, self->excused_us), now_us) >= silent_us(self);
 }
 
 uint32_t iw_wheel_rest_us(const iw_wheel_t *self, iw_time_us_t now_us) {

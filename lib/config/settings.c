@@ -136,7 +136,7 @@ static bool fit_line(loader_t *loader, const char *line, size_t length) {
     return true;
 }
 
-/// Checks `[name]`, followed by nothing or a comment. After anything else there is no valid section.
+/// Checks `[name]`, followed by nothing or a comment. Any other line is refused, and its keys have no section.
 static void check_section(loader_t *loader, const char *line, size_t length) {
     char name[LINE_MAX_LENGTH + 1U];
     char known[SETTINGS_MESSAGE_SIZE];

@@ -256,7 +256,7 @@ const char *inspect_assumption_cost(iw_assumption_item_t item) {
         [IW_ASSUMPTION_MOUNT_SIGN_LEFT] = "arm is refused; correct invert under [left]",
         [IW_ASSUMPTION_MOUNT_SIGN_RIGHT] = "arm is refused; correct invert under [right]",
         [IW_ASSUMPTION_WHEEL_RADIUS] = "no speed in mm/s and no distance; correct radius_mm under [wheels]",
-        [IW_ASSUMPTION_TRACK] = "no twist but straight ahead; correct track_mm under [wheels], or send drive",
+        [IW_ASSUMPTION_TRACK] = "a twist can only go straight ahead; correct track_mm under [wheels], or send drive",
         [IW_ASSUMPTION_GEAR_RATIO] =
             "no distance, and no speed in mm/s if the rpm are the rotor's; correct gear_ratio or "
             "rpm_of under [wheels]",

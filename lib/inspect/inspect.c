@@ -13,7 +13,7 @@ void inspect_begin(inspect_findings_t *self) {
     self->absent = INSPECT_FAIL;
 }
 
-void inspect_say(inspect_findings_t *self, const char *check, inspect_verdict_t verdict, const char *format, ...) {
+void inspect_add(inspect_findings_t *self, const char *check, inspect_verdict_t verdict, const char *format, ...) {
     self->total[verdict]++;
     if (self->count == INSPECT_FINDINGS_MAX) {
         self->lost++;
@@ -50,7 +50,7 @@ void inspect_sentence(const inspect_finding_t *finding, char *out_text, size_t s
 }
 
 /// Interval of reading the bus without a wake-up: unknown ids arrive through a socket that is not watched.
-#define LOOK_MS 10
+#define POLL_MS 10
 
 uint32_t inspect_nominal_mHz(const iw_codec_row_t *row) {
     return (row->kind == IW_CODEC_SETPOINT) ? 0U : 1000000U / row->period_ms;
@@ -127,7 +127,7 @@ void inspect_listen(iwl_hal_t *hal, iw_time_us_t for_us, inspect_traffic_t *out_
     const iw_time_us_t begin_us = iwl_clock_now_us();
     for (iw_time_us_t now_us = begin_us; now_us < begin_us + for_us; now_us = iwl_clock_now_us()) {
         poll_bus(hal, now_us, true, out_traffic);
-        (void)poll(&wait, 1, LOOK_MS);
+        (void)poll(&wait, 1, POLL_MS);
     }
     out_traffic->span_us = iwl_clock_now_us() - begin_us;
 }

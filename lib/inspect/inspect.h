@@ -48,7 +48,7 @@ void inspect_begin(inspect_findings_t *self);
 
 /// Adds a finding without a fix; counts it in `lost` if the list is full. `check` must be a literal: the list has only
 /// its address. A text that is too long is cut.
-__attribute__((format(printf, 4, 5))) void inspect_say(inspect_findings_t *self, const char *check,
+__attribute__((format(printf, 4, 5))) void inspect_add(inspect_findings_t *self, const char *check,
                                                        inspect_verdict_t verdict, const char *format, ...);
 
 /// Sets the fix of the last finding, cut if it is too long. Nothing if the list has lost a finding.

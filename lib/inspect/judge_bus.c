@@ -49,10 +49,10 @@ static void judge_rate(const inspect_traffic_t *traffic, unsigned index, inspect
     write_rate(inspect_rate_mHz(traffic, index), rate);
     write_rate(inspect_nominal_mHz(row), nominal);
     if (traffic->count[index] == 0U) {
-        inspect_say(findings, "rates", INSPECT_WARN, MESSAGE_FORMAT ": none received; the document has %s a second",
+        inspect_add(findings, "rates", INSPECT_WARN, MESSAGE_FORMAT ": none received; the document has %s a second",
                     side_of(row), name_of(row), row->id, row->id, nominal);
     } else {
-        inspect_say(findings, "rates", INSPECT_WARN, MESSAGE_FORMAT ": %s a second; the document has %s", side_of(row),
+        inspect_add(findings, "rates", INSPECT_WARN, MESSAGE_FORMAT ": %s a second; the document has %s", side_of(row),
                     name_of(row), row->id, row->id, rate, nominal);
     }
     inspect_fix(findings, "frames get lost: check termination (60 ohm between CAN-H and CAN-L), cable and adapter; or "
@@ -80,12 +80,12 @@ static void judge_wheel(const inspect_traffic_t *traffic, iw_side_t side, inspec
         }
     }
     if (speeds == 0U) {
-        inspect_say(findings, wheel_check(side), INSPECT_FAIL, "%s wheel: no telemetry for %" PRIu64 " ms", name,
+        inspect_add(findings, wheel_check(side), INSPECT_FAIL, "%s wheel: no telemetry for %" PRIu64 " ms", name,
                     span_ms);
         inspect_fix(findings, "check its power, cable and termination");
         return;
     }
-    inspect_say(findings, wheel_check(side), INSPECT_OK, "%s wheel: %s", name, list);
+    inspect_add(findings, wheel_check(side), INSPECT_OK, "%s wheel: %s", name, list);
     for (unsigned i = 0; i < IW_CODEC_ROWS; i++) {
         if (iw_codec_rows[i].side == side) {
             judge_rate(traffic, i, findings);
@@ -98,7 +98,7 @@ static void judge_others(const inspect_traffic_t *traffic, const inspect_config_
     const uint32_t setpoints = traffic->count[inspect_message_of(IW_ID_LEFT_SETPOINT)] +
                                traffic->count[inspect_message_of(IW_ID_RIGHT_SETPOINT)];
     if (setpoints > 0U && !config->others_may_send) {
-        inspect_say(findings, "second_master", INSPECT_FAIL,
+        inspect_add(findings, "second_master", INSPECT_FAIL,
                     "another device sends setpoints: %" PRIu32 " frames with id 266 (0x10A) or 298 (0x12A)", setpoints);
         inspect_fix(findings, "switch it off, or stop the gateway that sends them");
     }
@@ -118,7 +118,7 @@ static void judge_strangers(const inspect_traffic_t *traffic, const inspect_conf
         (void)snprintf(&list[length], sizeof list - length, extended ? "%s0x%08" PRIX32 : "%s0x%03" PRIX32,
                        (i > 0U) ? " " : "", number);
     }
-    inspect_say(findings, "unknown_ids", INSPECT_WARN, "%" PRIu32 " frames do not belong to the wheels: %s%s",
+    inspect_add(findings, "unknown_ids", INSPECT_WARN, "%" PRIu32 " frames do not belong to the wheels: %s%s",
                 traffic->strange, list, (traffic->strange_ids == INSPECT_STRANGERS) ? " ..." : "");
     inspect_fix(findings, "find out which device sends them: iwheelctl record - --can %s --for 2s | iwheelctl decode",
                 config->name);
@@ -126,13 +126,13 @@ static void judge_strangers(const inspect_traffic_t *traffic, const inspect_conf
 
 static void judge_damage(const inspect_traffic_t *traffic, inspect_findings_t *findings) {
     if (traffic->bad_length > 0U) {
-        inspect_say(findings, "lengths", INSPECT_WARN,
+        inspect_add(findings, "lengths", INSPECT_WARN,
                     "%" PRIu32 " frames of the wheels' ids are shorter than the document's table, and are ignored",
                     traffic->bad_length);
         inspect_fix(findings, "another device uses these ids, or this wheel has another firmware");
     }
     if (traffic->bad_format > 0U) {
-        inspect_say(findings, "lengths", INSPECT_WARN,
+        inspect_add(findings, "lengths", INSPECT_WARN,
                     "%" PRIu32 " remote, extended or FD frames have the wheels' ids, and are ignored",
                     traffic->bad_format);
         inspect_fix(findings, "find the device that sends them and configure other ids for it");
@@ -142,7 +142,7 @@ static void judge_damage(const inspect_traffic_t *traffic, inspect_findings_t *f
 static void judge_load(const inspect_traffic_t *traffic, const inspect_config_t *config, inspect_findings_t *findings) {
     const uint32_t load = inspect_load_permille(traffic, config->bitrate_hz);
     const bool high = load > LOAD_HIGH_PERMILLE;
-    inspect_say(findings, "load", high ? INSPECT_WARN : INSPECT_OK,
+    inspect_add(findings, "load", high ? INSPECT_WARN : INSPECT_OK,
                 "bus load: %" PRIu32 ".%" PRIu32 " %% without stuff bits; both wheels alone make about 6 %%",
                 load / 10U, load % 10U);
     if (high) {
@@ -151,8 +151,8 @@ static void judge_load(const inspect_traffic_t *traffic, const inspect_config_t 
 }
 
 /// Reports a controller that is bus-off: missing frames then show nothing about wheels and cables.
-static void say_bus_off(const iwl_bus_link_t *link, const char *bus, inspect_findings_t *findings) {
-    inspect_say(findings, "bus_state", INSPECT_FAIL,
+static void add_bus_off(const iwl_bus_link_t *link, const char *bus, inspect_findings_t *findings) {
+    inspect_add(findings, "bus_state", INSPECT_FAIL,
                 "bus %s: bus-off: too many errors, the controller has left the bus", bus);
     if (link->presence == IWL_LINK_LOCAL) {
         inspect_fix(findings, "end it in the simulator: iwheel-sim busoff off");
@@ -168,18 +168,18 @@ static bool judge_life(const iwl_bus_link_t *link, const inspect_traffic_t *traf
     const char *bus = config->name;
     const bool off = traffic->last == IW_BUS_OFF || (!traffic->was_up && link->presence == IWL_LINK_UP);
     if (link->presence == IWL_LINK_LOCAL && (traffic->was_up || off)) {
-        inspect_say(findings, "interface", INSPECT_OK, "bus %s: up", bus);
+        inspect_add(findings, "interface", INSPECT_OK, "bus %s: up", bus);
     } else if (link->presence == IWL_LINK_LOCAL) {
-        inspect_say(findings, "interface", INSPECT_FAIL, "bus %s: no simulator there", bus);
+        inspect_add(findings, "interface", INSPECT_FAIL, "bus %s: no simulator there", bus);
         inspect_fix(findings, "start the simulator: iwheel-sim --can %s", bus);
     }
     if (off) {
-        say_bus_off(link, bus, findings);
+        add_bus_off(link, bus, findings);
     } else if (traffic->was_up && traffic->worst == IW_BUS_OFF) {
-        inspect_say(findings, "bus_state", INSPECT_WARN, "bus %s: it was bus-off during the check", bus);
+        inspect_add(findings, "bus_state", INSPECT_WARN, "bus %s: it was bus-off during the check", bus);
         inspect_fix(findings, "check cable, termination and bit rate");
     } else if (traffic->was_up && traffic->worst == IW_BUS_PASSIVE) {
-        inspect_say(findings, "bus_state", INSPECT_WARN, "bus %s: error passive: most frames fail", bus);
+        inspect_add(findings, "bus_state", INSPECT_WARN, "bus %s: error passive: most frames fail", bus);
         inspect_fix(findings, "check bit rate, sample point, termination; a wheel without power acknowledges nothing");
     }
     return traffic->was_up && !off;

@@ -67,20 +67,20 @@ inspect_estop_t inspect_estop_of(const iwl_hal_t *hal, const char *line) {
 
 void inspect_estop(const inspect_estop_t *estop, inspect_findings_t *findings) {
     if (!estop->present) {
-        inspect_say(findings, "estop", INSPECT_WARN, "e-stop: none");
+        inspect_add(findings, "estop", INSPECT_WARN, "e-stop: none");
         inspect_fix(findings, "wire a button and set [estop] line");
     } else if (estop->level < 0) {
-        inspect_say(findings, "estop", estop->no_gpio ? findings->absent : INSPECT_FAIL,
+        inspect_add(findings, "estop", estop->no_gpio ? findings->absent : INSPECT_FAIL,
                     "e-stop %s: unreadable%s%s, which counts as pressed", estop->line,
                     (estop->pressed_at != NULL) ? " at " : "", (estop->pressed_at != NULL) ? estop->pressed_at : "");
         inspect_fix(findings, "%s", estop->trouble);
     } else if (estop->level == IW_ESTOP_DISAGREES) {
-        inspect_say(findings, "estop", INSPECT_FAIL, "e-stop %s: its two contacts disagree, pressed at %s", estop->line,
+        inspect_add(findings, "estop", INSPECT_FAIL, "e-stop %s: its two contacts disagree, pressed at %s", estop->line,
                     (estop->pressed_at != NULL) ? estop->pressed_at : "one");
         inspect_fix(findings, "fix contact or wire, press and release the button");
     } else {
         const bool where = estop->level > 0 && estop->pressed_at != NULL;
-        inspect_say(findings, "estop", estop->simulated ? INSPECT_WARN : INSPECT_OK, "e-stop %s: %s%s%s%s", estop->line,
+        inspect_add(findings, "estop", estop->simulated ? INSPECT_WARN : INSPECT_OK, "e-stop %s: %s%s%s%s", estop->line,
                     (estop->level > 0) ? "pressed" : "released", where ? " at " : "", where ? estop->pressed_at : "",
                     estop->simulated ? ", SIMULATED" : "");
         if (estop->simulated) {
@@ -93,20 +93,20 @@ void inspect_unopened(const char *cause, bool is_bus, int error, inspect_finding
     const char *check = is_bus ? "interface" : "estop";
     const char *what = is_bus ? "bus" : "e-stop";
     if (error == ENOTSUP) {
-        inspect_say(findings, check, findings->absent,
+        inspect_add(findings, check, findings->absent,
                     "%s %s: %s was missing when this was built, so it %s only (unix:PATH)", what, cause,
                     is_bus ? "libmnl" : "libgpiod",
                     is_bus ? "serves the simulator's bus" : "reads the simulator's button");
         inspect_fix(findings, "apt-get install %s, configure and build again", is_bus ? "libmnl-dev" : "libgpiod-dev");
     } else if (error == ENOTUNIQ && !is_bus) {
-        inspect_say(findings, check, INSPECT_FAIL,
+        inspect_add(findings, check, INSPECT_FAIL,
                     "e-stop %s: [estop] line and line2 are the same line, so there is no second contact", cause);
         inspect_fix(findings, "write the line of the other contact as line2 (gpioinfo lists them), or line2 = none");
     } else if (error == EAFNOSUPPORT && is_bus) {
-        inspect_say(findings, check, findings->absent, "bus %s: this kernel has no CAN sockets", cause);
+        inspect_add(findings, check, findings->absent, "bus %s: this kernel has no CAN sockets", cause);
         inspect_fix(findings, "modprobe can_raw, or use the simulator's bus: --can unix:PATH");
     } else {
-        inspect_say(findings, check, INSPECT_FAIL, "%s %s: %s", what, cause, strerror(error));
+        inspect_add(findings, check, INSPECT_FAIL, "%s %s: %s", what, cause, strerror(error));
         inspect_fix(findings, "correct %s", is_bus ? "[bus] interface or --can" : "[estop] line or --estop");
     }
 }

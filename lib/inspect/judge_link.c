@@ -20,16 +20,16 @@ static void judge_presence(const iwl_bus_link_t *link, const inspect_config_t *c
     const char *bus = config->name;
     switch (link->presence) {
     case IWL_LINK_ABSENT:
-        inspect_say(findings, "interface", INSPECT_FAIL, "bus %s: there is no such interface", bus);
+        inspect_add(findings, "interface", INSPECT_FAIL, "bus %s: there is no such interface", bus);
         inspect_fix(findings, "plug the adapter in, or name the right one in [bus] interface: ip -brief link show "
                               "type can");
         break;
     case IWL_LINK_NOT_CAN:
-        inspect_say(findings, "interface", INSPECT_FAIL, "bus %s: not a CAN interface", bus);
+        inspect_add(findings, "interface", INSPECT_FAIL, "bus %s: not a CAN interface", bus);
         inspect_fix(findings, "name the right one in [bus] interface: ip -brief link show type can");
         break;
     case IWL_LINK_DOWN:
-        inspect_say(findings, "interface", INSPECT_FAIL, "bus %s: the interface is down", bus);
+        inspect_add(findings, "interface", INSPECT_FAIL, "bus %s: the interface is down", bus);
         if (link->is_virtual) {
             inspect_fix(findings, "ip link set %s up", bus);
         } else {
@@ -37,7 +37,7 @@ static void judge_presence(const iwl_bus_link_t *link, const inspect_config_t *c
         }
         break;
     default:
-        inspect_say(findings, "interface", INSPECT_OK, "bus %s: the interface is up", bus);
+        inspect_add(findings, "interface", INSPECT_OK, "bus %s: the interface is up", bus);
         break;
     }
 }
@@ -45,7 +45,7 @@ static void judge_presence(const iwl_bus_link_t *link, const inspect_config_t *c
 static void judge_mode(const iwl_bus_link_t *link, const inspect_config_t *config, inspect_findings_t *findings) {
     const char *bus = config->name;
     if (link->is_mute) {
-        inspect_say(findings, "mode", INSPECT_FAIL, "%s is in listen-only mode and cannot send", bus);
+        inspect_add(findings, "mode", INSPECT_FAIL, "%s is in listen-only mode and cannot send", bus);
         inspect_fix(findings, "ip link set %s down; ip link set %s type can listen-only off; ip link set %s up", bus,
                     bus, bus);
     }
@@ -69,7 +69,7 @@ static void judge_timing(const iwl_bus_link_t *link, const inspect_config_t *con
         (void)snprintf(sample_point, sizeof sample_point, "%u.%u %%", link->sample_point_permille / 10U,
                        link->sample_point_permille % 10U);
     }
-    inspect_say(findings, "bit_timing",
+    inspect_add(findings, "bit_timing",
                 (timing == IWL_TIMING_WRONG && !config->refuses) ? INSPECT_WARN : verdicts[timing],
                 "bit timing: %s, sample point %s; wanted %" PRIu32 " bit/s, %u.%u %%", bitrate, sample_point,
                 config->bitrate_hz, config->sample_point_permille / 10U, config->sample_point_permille % 10U);
@@ -82,9 +82,9 @@ static void judge_queue(const iwl_bus_link_t *link, const inspect_config_t *conf
     if (link->presence < IWL_LINK_DOWN || link->is_virtual || link->queue_length <= IWL_LINK_QUEUE_MAX) {
         return;
     }
-    inspect_say(findings, "queue", INSPECT_WARN,
-                "queue of %s: %" PRIu32 " frames may wait in it, and be old when a dead bus revives", config->name,
-                link->queue_length);
+    inspect_add(findings, "queue", INSPECT_WARN,
+                "queue of %s: %" PRIu32 " frames may wait in it, and be outdated when the bus works again",
+                config->name, link->queue_length);
     inspect_fix(findings, "ip link set %s txqueuelen %u", config->name, IWL_LINK_QUEUE_MAX);
 }
 
@@ -93,7 +93,7 @@ static void judge_restart(const iwl_bus_link_t *link, const inspect_config_t *co
     if (link->presence < IWL_LINK_DOWN || link->is_virtual || link->restart_ms != 0U) {
         return;
     }
-    inspect_say(findings, "restart", INSPECT_WARN, "after bus-off %s stays off until a person restarts it", bus);
+    inspect_add(findings, "restart", INSPECT_WARN, "after bus-off %s stays off until a person restarts it", bus);
     inspect_fix(findings, "ip link set %s down; ip link set %s type can restart-ms 100; ip link set %s up", bus, bus,
                 bus);
 }
@@ -102,9 +102,9 @@ static void judge_echo(const iwl_bus_link_t *link, const inspect_config_t *confi
     if (link->presence == IWL_LINK_ABSENT || link->presence == IWL_LINK_NOT_CAN || link->echo_proven) {
         return;
     }
-    inspect_say(findings, "echo", INSPECT_WARN,
+    inspect_add(findings, "echo", INSPECT_WARN,
                 "the echo of %s is unproven: whether a setpoint was on the bus cannot be known", config->name);
-    inspect_fix(findings, "use an adapter whose driver has IFF_ECHO (most have; vcan and slcan have not)");
+    inspect_fix(findings, "use an adapter whose driver has IFF_ECHO (most have it; vcan and slcan do not)");
 }
 
 void inspect_room(const iwl_bus_link_t *link, inspect_findings_t *findings) {
@@ -112,7 +112,7 @@ void inspect_room(const iwl_bus_link_t *link, inspect_findings_t *findings) {
         return;
     }
     const bool granted = link->room_bytes >= 2U * IWL_LINK_ROOM_BYTES;
-    inspect_say(findings, "room", granted ? INSPECT_OK : INSPECT_WARN,
+    inspect_add(findings, "room", granted ? INSPECT_OK : INSPECT_WARN,
                 "receive buffer: %" PRIu32 " of %u KiB granted, %" PRIu32 " ms of a full bus%s",
                 link->room_bytes / 2U / 1024U, IWL_LINK_ROOM_BYTES / 1024U, link->room_bytes / BYTES_PER_MS,
                 granted ? "" : "; if other programs use the processor for longer, frames get lost");

@@ -15,9 +15,7 @@ void candump_reader_init(candump_reader_t *self, int fd) {
     self->why = "";
     self->begin = 0;
     self->end = 0;
-    self->begun = false;
-    self->ended = false;
-    self->failed = false;
+    self->source = CANDUMP_NEW;
 }
 
 static void fill(candump_reader_t *self) {
@@ -29,8 +27,13 @@ static void fill(candump_reader_t *self) {
         got = read(self->fd, &self->buffer[self->end], sizeof self->buffer - self->end);
     } while (got < 0 && errno == EINTR);
     self->end += (got > 0) ? (size_t)got : 0U;
-    self->ended = got <= 0;
-    self->failed = got < 0;
+    if (got <= 0) {
+        self->source = (got < 0) ? CANDUMP_BROKEN : CANDUMP_ENDED;
+    }
+}
+
+static bool has_ended(const candump_reader_t *self) {
+    return self->source >= CANDUMP_ENDED;
 }
 
 /// Returns the newline of the next line, at most CANDUMP_READ_MAX ahead, or NULL if there is none yet.
@@ -39,7 +42,7 @@ static const char *find_newline(candump_reader_t *self) {
         const size_t there = self->end - self->begin;
         const size_t searched = (there < CANDUMP_READ_MAX) ? there : CANDUMP_READ_MAX;
         const char *newline = memchr(&self->buffer[self->begin], '\n', searched);
-        if (newline != NULL || self->ended || searched == CANDUMP_READ_MAX) {
+        if (newline != NULL || has_ended(self) || searched == CANDUMP_READ_MAX) {
             return newline;
         }
         fill(self);
@@ -48,7 +51,7 @@ static const char *find_newline(candump_reader_t *self) {
 
 static void skip_line(candump_reader_t *self) {
     const char *newline = NULL;
-    while (newline == NULL && (self->begin < self->end || !self->ended)) {
+    while (newline == NULL && (self->begin < self->end || !has_ended(self))) {
         newline = memchr(&self->buffer[self->begin], '\n', self->end - self->begin);
         self->begin = (newline != NULL) ? (size_t)(newline - self->buffer) + 1U : self->end;
         if (newline == NULL) {
@@ -65,8 +68,11 @@ static candump_read_t report_bad(candump_reader_t *self, const char *why) {
 /// Handles a rest without newline: too long, cut, or the end.
 static candump_read_t read_rest(candump_reader_t *self, candump_t *frame) {
     const size_t there = self->end - self->begin;
-    if (self->failed || there == 0U) {
-        return self->failed ? CANDUMP_READ_FAILED : CANDUMP_READ_END;
+    if (self->source == CANDUMP_BROKEN) {
+        return CANDUMP_READ_FAILED;
+    }
+    if (there == 0U) {
+        return CANDUMP_READ_END;
     }
     self->line++;
     if (there >= CANDUMP_READ_MAX) {
@@ -84,7 +90,7 @@ static candump_read_t read_rest(candump_reader_t *self, candump_t *frame) {
 
 /// Skips a byte order mark. Returns false and sets `why` if the first line is in another form.
 static bool begin(candump_reader_t *self) {
-    self->begun = true;
+    self->source = CANDUMP_OPEN;
     (void)find_newline(self);
     self->begin += candump_form_mark(&self->buffer[self->begin], self->end - self->begin);
     const char *why = candump_form_foreign(&self->buffer[self->begin], self->end - self->begin);
@@ -92,13 +98,13 @@ static bool begin(candump_reader_t *self) {
         self->why = why;
         self->line = 1;
         self->begin = self->end;
-        self->ended = true;
+        self->source = CANDUMP_ENDED;
     }
     return why == NULL;
 }
 
 candump_read_t candump_reader_next(candump_reader_t *self, candump_t *out_frame) {
-    if (!self->begun && !begin(self)) {
+    if (self->source == CANDUMP_NEW && !begin(self)) {
         return CANDUMP_READ_FOREIGN;
     }
     for (;;) {

@@ -17,15 +17,21 @@ typedef enum {
     CANDUMP_READ_FAILED, ///< errno is the reason why the file cannot be read.
 } candump_read_t;
 
+/// State of the file, in this order.
+typedef enum {
+    CANDUMP_NEW = 0, ///< The first bytes were not yet compared with the forms of other programs.
+    CANDUMP_OPEN,
+    CANDUMP_ENDED, ///< All bytes are in `buffer`.
+    CANDUMP_BROKEN ///< The same, because a read failed.
+} candump_source_t;
+
 typedef struct {
     uint64_t line; ///< Number of the last line; the first is 1.
     const char *why;
     size_t begin; ///< The unread bytes are [begin, end) of `buffer`.
     size_t end;
     int fd;
-    bool begun; ///< The first bytes were compared with the forms of other programs.
-    bool ended;
-    bool failed;
+    candump_source_t source;
     char buffer[65536];
 } candump_reader_t;
 

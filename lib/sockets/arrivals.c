@@ -59,11 +59,11 @@ void sock_service_refuse_crowd(const sock_clients_t *self, const sock_client_t *
 
 /// Closes a connection whose time has expired without a stop.
 static void turn_away(sock_clients_t *self, sock_client_t *client) {
-    const iwn_id_t nobody = {.kind = IWN_ID_NONE};
+    const iwn_id_t no_id = {.kind = IWN_ID_NONE};
     sock_listener_t *listener = &self->listener[right_of(self, client)];
     iwn_refusal_t refusal;
     sock_service_refuse_crowd(self, client, &refusal);
-    sock_clients_refuse(self, client, &nobody, &refusal);
+    sock_clients_refuse(self, client, &no_id, &refusal);
     sock_service_finish(self, client);
     if (!listener->full_reported) {
         sock_log(self->log, SOCK_LOG_WARNING, "refused a client: %s", refusal.message);
@@ -97,7 +97,7 @@ static sock_client_t *older(sock_client_t *known, sock_client_t *other) {
 static void find_oldest(places_t *seen, sock_client_t *place, uid_t uid) {
     const bool own = place->uid == uid;
     seen->held += own ? 1U : 0U;
-    if (!place->said && !sock_client_is_closing(place)) {
+    if (!place->executed && !sock_client_is_closing(place)) {
         seen->oldest = older(seen->oldest, place);
         if (own) {
             seen->own = older(seen->own, place);
@@ -147,7 +147,7 @@ static void receive_stop(sock_clients_t *self, const newcomer_t *newcomer, sock_
     client->close_us = self->now_us + SOCK_STOP_US;
     client->readable = true;
     sock_service_serve(self, client);
-    if (place == NULL && !sock_client_is_closing(client) && !client->said) {
+    if (place == NULL && !sock_client_is_closing(client) && !client->executed) {
         turn_away(self, client);
     }
     (void)sock_service_flush_one(self, client);
@@ -222,7 +222,7 @@ void sock_service_poll_arrivals(sock_clients_t *self) {
         if (sock_client_is_closing(client) || self->now_us < client->close_us) {
             continue;
         }
-        if (client->said) {
+        if (client->executed) {
             sock_service_finish(self, client);
         } else {
             turn_away(self, client);

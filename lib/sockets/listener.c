@@ -90,7 +90,7 @@ static void leave(int back) {
     }
 }
 
-static bool somebody_answers(const struct sockaddr_un *address) {
+static bool is_answered(const struct sockaddr_un *address) {
     const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
     const bool answered =
         fd >= 0 && (connect(fd, (const struct sockaddr *)address, sizeof *address) == 0 || errno != ECONNREFUSED);
@@ -141,7 +141,7 @@ static int clear_name(const sock_listener_t *self, const struct sockaddr_un *add
         return result;
     }
     const bool stranger = !sock_owners_have(&self->owners, status.st_uid);
-    if (!stranger && somebody_answers(address)) {
+    if (!stranger && is_answered(address)) {
         return complain(self, err, "another program answers on it", "stop that one, or choose another path with");
     }
     return remove_name(self, stranger, err);

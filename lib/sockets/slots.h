@@ -13,9 +13,6 @@ typedef struct {
 
 extern const sock_part_t sock_parts[SOCK_PARTS];
 
-/// Ends the lease of the client, and closes it after it has received its queue.
-void sock_service_finish(sock_clients_t *self, sock_client_t *client);
-
 /// Closes the client and frees its slot.
 void sock_service_release(sock_clients_t *self, sock_client_t *client);
 

@@ -33,10 +33,39 @@ const char *sock_client_line(const sock_client_t *self, size_t *out_length) {
     return self->in;
 }
 
-void sock_client_drop_line(sock_client_t *self, size_t length) {
-    const size_t left = self->in_length - (length + 1U);
-    memmove(self->in, &self->in[length + 1U], left);
-    self->in_length = left;
+/// Returns true if the line may be a stop request. Other lines need not be read.
+static bool may_stop(const char *line, size_t length) {
+    return memmem(line, length, "stop", 4U) != NULL || memmem(line, length, "disarm", 6U) != NULL;
+}
+
+const char *sock_client_next_stop(const sock_client_t *self, size_t *at, size_t *out_length) {
+    const char *line = &self->in[*at];
+    const char *end;
+    while ((end = (const char *)memchr(line, '\n', self->in_length - *at)) != NULL) {
+        *out_length = (size_t)(end - line);
+        *at += *out_length + 1U;
+        if (may_stop(line, *out_length)) {
+            return line;
+        }
+        line = end + 1;
+    }
+    return NULL;
+}
+
+void sock_client_drop_line(sock_client_t *self, const char *line, size_t length) {
+    const size_t begin = (size_t)(line - self->in);
+    const size_t end = begin + length + 1U;
+    memmove(&self->in[begin], &self->in[end], self->in_length - end);
+    self->in_length -= length + 1U;
+}
+
+bool sock_client_read_on(sock_client_t *self, size_t searched) {
+    const size_t rest = self->in_length - searched;
+    memmove(self->in, &self->in[searched], rest);
+    self->in_length = (rest < sizeof self->in) ? rest : 0U; // Without a newline in all of it, it is no request.
+    const ssize_t count = recv(self->fd, &self->in[self->in_length], sizeof self->in - self->in_length, MSG_DONTWAIT);
+    self->in_length += (count > 0) ? (size_t)count : 0U;
+    return count > 0;
 }
 
 void sock_client_note_caught_up(sock_client_t *self, iw_time_us_t then_us) {

@@ -49,7 +49,7 @@ typedef struct sock_client {
     // Reasons to wait: both may be true, because only the first one delays later lines.
     bool held;     ///< Its next line waits: an arm is not decided, or the relay has no space.
     bool owed;     ///< A reply is still to come; until then the connection stays open even if it has ended.
-    bool said;     ///< Beyond the maximum: its one line was executed. True until the slot is freed, in every phase.
+    bool executed; ///< Beyond the maximum: its one line was executed. True until the slot is freed, in every phase.
     uint32_t lost; ///< Number of events that did not fit since the last `lost` event.
     bool drained;  ///< The last read returned all available bytes.
     iw_time_us_t caught_up_us; ///< Time at which nothing of it was waiting: later bytes were sent after it.
@@ -68,7 +68,16 @@ void sock_client_read(sock_client_t *self);
 
 /// Returns the next complete line without its newline, or NULL. It is valid until `sock_client_drop_line`.
 const char *sock_client_line(const sock_client_t *self, size_t *out_length);
-void sock_client_drop_line(sock_client_t *self, size_t length);
+/// Removes this line, which is one of the buffer.
+void sock_client_drop_line(sock_client_t *self, const char *line, size_t length);
+
+/// Returns the next complete line from `*at` on that may be a stop request, or NULL. `*at` is then after it; it begins
+/// with 0.
+const char *sock_client_next_stop(const sock_client_t *self, size_t *at, size_t *out_length);
+
+/// Drops the first `searched` bytes and reads on, in every phase. Returns false if nothing more is waiting. One system
+/// call.
+bool sock_client_read_on(sock_client_t *self, size_t searched);
 
 /// Records that nothing of it was waiting at `then_us`, if the last read returned all bytes and no complete line is
 /// left. A later recorded time is retained.

@@ -34,6 +34,8 @@ typedef struct sock_handler {
     void (*welcome)(void *context, sock_client_t *client); ///< A client has connected, also one that may only stop.
     /// Executes a line. For a closing connection only stop requests.
     void (*carry_out)(void *context, sock_client_t *client, const char *line, size_t length);
+    /// Returns true if the line is a stop request: then it precedes a watcher's earlier lines. NULL: none does.
+    bool (*stops)(void *context, const char *line, size_t length);
     void (*leave)(void *context, sock_client_t *client); ///< The client can no longer hold a lease.
     void *context;
 } sock_handler_t;
@@ -100,6 +102,8 @@ enum {
 
 /// Number of lines of a closing client that are searched for stop requests.
 #define SOCK_LAST_LINES 16U
+/// Number of reads of such a client's lines that were not read before: more than the buffer of a socket in Linux.
+#define SOCK_LAST_READS 64U
 
 /// Number of connections that each socket accepts in one cycle, within SOCK_ROUND_US.
 #define SOCK_ACCEPTS_PER_CYCLE 8U
@@ -118,6 +122,11 @@ enum {
 /// Refuses a connection beyond the maximum whose first line is not a stop request or does not arrive.
 void sock_service_refuse_crowd(const sock_clients_t *self, const sock_client_t *client, iwn_refusal_t *out_refusal);
 
+struct epoll_event;
+
+/// Records the result of the wait for a client: an event with the tag of its slot.
+void sock_service_note(sock_clients_t *self, const struct epoll_event *event);
+
 /// Accepts connections. It executes the stop requests of those without a place, and refuses the others.
 void sock_service_accept(sock_clients_t *self);
 
@@ -130,6 +139,10 @@ void sock_service_first(sock_clients_t *self, sock_client_t *client);
 
 /// Sends queued lines, closes finished connections, and updates epoll, in the same order and within the same time.
 void sock_service_flush(sock_clients_t *self, iw_client_t holder);
+
+/// Executes the stop requests that were received from the client, ends its lease, and closes it after it has received its
+/// queue.
+void sock_service_finish(sock_clients_t *self, sock_client_t *client);
 
 /// Returns true if a client waits, so that the next wait must not sleep.
 bool sock_service_is_busy(const sock_clients_t *self);

@@ -16,26 +16,27 @@ const sock_part_t sock_parts[SOCK_PARTS] = {
     [SOCK_STOP] = {SOCK_DRIVERS_MAX + SOCK_WATCHERS_MAX, SOCK_RIGHTS *SOCK_STOP_SLOTS},
 };
 
-/// Returns true if the line may be a stop request. Other lines need not be read.
-static bool may_stop(const char *line, size_t length) {
-    return memmem(line, length, "stop", 4U) != NULL || memmem(line, length, "disarm", 6U) != NULL;
+void sock_service_note(sock_clients_t *self, const struct epoll_event *event) {
+    sock_client_t *client = &self->client[event->data.u64 - SOCK_TAG_CLIENT];
+    client->readable = (event->events & (EPOLLIN | EPOLLRDHUP)) != 0U;
+    client->leaving = client->leaving || (event->events & (EPOLLRDHUP | EPOLLHUP | EPOLLERR)) != 0U;
+    client->hung_up = (event->events & (EPOLLHUP | EPOLLERR)) != 0U;
 }
 
-/// Executes the stop requests among the lines that were received but not read.
+/// Executes the stop requests among the lines that were received but not executed, also those still in the socket.
 static void read_last_lines(sock_clients_t *self, sock_client_t *client) {
-    const char *line = client->in;
-    size_t left = client->in_length;
+    const char *line;
+    size_t at;
+    size_t length;
     unsigned lines = 0;
-    const char *end;
-    while (lines < SOCK_LAST_LINES && (end = (const char *)memchr(line, '\n', left)) != NULL) {
-        const size_t length = (size_t)(end - line);
-        if (may_stop(line, length)) {
+    unsigned reads = 0;
+    do {
+        at = 0;
+        while (lines < SOCK_LAST_LINES && (line = sock_client_next_stop(client, &at, &length)) != NULL) {
             self->handler.carry_out(self->handler.context, client, line, length);
             lines++;
         }
-        left -= length + 1U;
-        line = end + 1;
-    }
+    } while (lines < SOCK_LAST_LINES && reads++ < SOCK_LAST_READS && sock_client_read_on(client, at));
     client->in_length = 0;
 }
 
@@ -59,17 +60,17 @@ void sock_service_release(sock_clients_t *self, sock_client_t *client) {
 }
 
 static void refuse_long_line(sock_clients_t *self, sock_client_t *client) {
-    const iwn_id_t nobody = {.kind = IWN_ID_NONE};
+    const iwn_id_t no_id = {.kind = IWN_ID_NONE};
     iwn_refusal_t refusal = {.error = IWN_LINE_TOO_LONG};
     (void)snprintf(refusal.message, sizeof refusal.message,
                    "a request has at most %u bytes and ends with a newline; the connection is closed", IWN_LINE_MAX);
-    sock_clients_refuse(self, client, &nobody, &refusal);
+    sock_clients_refuse(self, client, &no_id, &refusal);
     sock_service_finish(self, client);
 }
 
 static bool has_line(const sock_client_t *client) {
     size_t length;
-    return !sock_client_is_closing(client) && !client->held && !client->said &&
+    return !sock_client_is_closing(client) && !client->held && !client->executed &&
            sock_client_line(client, &length) != NULL;
 }
 
@@ -86,13 +87,37 @@ static void pace(sock_client_t *client, iw_time_us_t now_us) {
     client->line_us = (rested ? now_us - saved_us : client->line_us) + SOCK_WATCHER_LINE_US;
 }
 
+/// Returns the line to execute now. A watcher's lines wait for each other for long, so its stop requests go first.
+static const char *next_line(const sock_clients_t *self, const sock_client_t *client, size_t *out_length) {
+    const sock_handler_t *const handler = &self->handler;
+    if (client->right == SOCK_WATCH && handler->stops != NULL) {
+        const char *line;
+        size_t at = 0;
+        for (unsigned i = 0; i < SOCK_LAST_LINES && (line = sock_client_next_stop(client, &at, out_length)) != NULL;
+             i++) {
+            if (handler->stops(handler->context, line, *out_length)) {
+                return line;
+            }
+        }
+    }
+    return sock_client_line(client, out_length);
+}
+
+/// Input of a watcher whose lines wait does not wake the loop, but a stop in it precedes the next of them.
+static void read_lines(const sock_clients_t *self, sock_client_t *client) {
+    const bool waits = client->right == SOCK_WATCH && has_turn(self, client);
+    if (client->readable || client->hung_up || waits) {
+        sock_client_read(client);
+    }
+}
+
 static void carry_out_lines(sock_clients_t *self, sock_client_t *client) {
     for (unsigned i = 0; i < SOCK_LINES_PER_CYCLE && !sock_client_is_broken(client) && has_turn(self, client); i++) {
         size_t length;
-        const char *line = sock_client_line(client, &length);
+        const char *line = next_line(self, client, &length);
         self->handler.carry_out(self->handler.context, client, line, length);
-        sock_client_drop_line(client, length);
-        client->said = client->right == SOCK_STOP;
+        sock_client_drop_line(client, line, length);
+        client->executed = client->right == SOCK_STOP;
         pace(client, self->now_us);
     }
 }
@@ -107,14 +132,12 @@ void sock_service_serve(sock_clients_t *self, sock_client_t *client) {
     if (client->leaving) {
         self->handler.leave(self->handler.context, client); // Immediately, whatever it has sent before.
     }
-    if (client->readable || client->hung_up) {
-        sock_client_read(client);
-    }
+    read_lines(self, client);
     carry_out_lines(self, client);
     if (!sock_client_is_closing(client) && !client->held && sock_client_line_too_long(client)) {
         refuse_long_line(self, client);
     }
-    const bool done = client->said && !client->owed; // Its one line is answered.
+    const bool done = client->executed && !client->owed; // Its one line is answered.
     const bool over = client->phase == SOCK_BROKEN || done || has_ended(client);
     if (over && !sock_client_is_closing(client)) {
         sock_service_finish(self, client);

@@ -28,7 +28,7 @@ static_assert(
 static_assert(BRD_PLL_M >= 1U && BRD_PLL_M <= 16U && BRD_PLL_N >= 8U && BRD_PLL_N <= 127U, "7.4");
 static_assert(BRD_PLL_INPUT_HZ * BRD_PLL_N / BRD_PLL_R == BRD_CORE_HZ && BRD_PLL_R == 4U, "the PLL's output");
 static_assert(BRD_CORE_HZ <= 150000000U, "faster needs the boost mode (6.1)");
-static_assert(BRD_APB1_HZ == BRD_CORE_HZ, "no bus is divided");
+static_assert(BRD_APB1_HZ == BRD_CORE_HZ, "APB1 has the clock of the core");
 
 // Leaves the voltage at its value after reset: range 1 without boost, which allows 150 MHz (6.1). FDCAN has the clock
 // of its bus: 44.3 requires that the bus is not slower than the kernel.

@@ -164,12 +164,12 @@ int brd_bxcan_send(void *context, const iw_can_frame_t *frames, uint32_t count) 
 }
 
 /// Returns true once after a loss of frames, with the report of the controller in `*out_frame`. The core counts it.
-static bool tell_loss(brd_bxcan_t *self, iw_can_frame_t *out_frame) {
+static bool report_loss(brd_bxcan_t *self, iw_can_frame_t *out_frame) {
     const uint32_t losses = self->overruns + self->lost;
-    if (losses == self->losses_told) {
+    if (losses == self->losses_reported) {
         return false;
     }
-    self->losses_told = losses;
+    self->losses_reported = losses;
     *out_frame = (iw_can_frame_t){.id = IW_CAN_ERROR, .kind = IW_CAN_RECEIVED};
     return true;
 }
@@ -178,7 +178,7 @@ int brd_bxcan_receive(void *context, iw_can_frame_t *out_frame) {
     brd_bxcan_t *const self = context;
     iw_can_frame_t frame;
     uint8_t epoch;
-    if (tell_loss(self, out_frame)) {
+    if (report_loss(self, out_frame)) {
         return 1;
     }
     while (brd_frame_ring_take(&self->ring, &frame, &epoch)) {
@@ -223,7 +223,7 @@ static bool take_back(brd_bxcan_t *self) {
 /// Resets the controller with its mailboxes after an abort that does not end. `bus_state` reports STARTING as a loss of
 /// the bus, and nothing is sent before the controller has joined the bus again. Until then the reset masks its
 /// interrupts.
-static void start_anew(brd_bxcan_t *self) {
+static void restart(brd_bxcan_t *self) {
     brd_register_t *const reset = self->config.reset_register;
     brd_register_write(reset, brd_register_read(reset) | self->config.reset_bits);
     brd_register_write(reset, brd_register_read(reset) & ~self->config.reset_bits);
@@ -243,7 +243,7 @@ int brd_bxcan_purge(void *context) {
     if (self->phase != BRD_BXCAN_RUNNING || is_bus_off(self)) {
         return 0;
     }
-    start_anew(self);
+    restart(self);
     return 1;
 }
 

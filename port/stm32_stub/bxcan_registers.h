@@ -29,7 +29,7 @@ typedef struct {
     brd_bxcan_mailbox_t tx[3];
     brd_bxcan_fifo_t rx[2];
     uint32_t reserved2[12];
-    brd_register_t FMR, FM1R; ///< Filters: bxCAN 9.4. Of two controllers only the first one has them, for both.
+    brd_register_t FMR, FM1R; ///< Filters: bxCAN 9.4. Only the first of two controllers has them, for both.
     uint32_t reserved3;
     brd_register_t FS1R;
     uint32_t reserved4;

@@ -19,9 +19,16 @@ static volatile uint32_t ticks_slept; // Lower half of ticks_ms, which one acces
 static atomic_bool is_woken;
 static uint32_t cycles_per_us = 1;
 
+/// A handler that returns before its last write has arrived can make the CPU enter the wrong handler (ES0430 2.1.3: Arm
+/// erratum 838869). It would then lose a tick.
+static void finish_writes(void) {
+    __asm volatile("dsb" ::: "memory");
+}
+
 void brd_systick_handler(void) {
     ticks_ms++;
     ticks_slept++;
+    finish_writes();
 }
 
 void brd_irq_enable(brd_irq_t irq) {
@@ -48,6 +55,7 @@ iw_time_us_t brd_time_now_us(void) {
 
 void brd_wake(void) {
     atomic_store_explicit(&is_woken, true, memory_order_relaxed);
+    finish_writes();
 }
 
 /// WFI also returns for an interrupt that is pending but masked, so none is missed between the check and the sleep.

@@ -30,7 +30,8 @@ void brd_time_start(uint32_t core_hz);
 /// interrupts are masked.
 iw_time_us_t brd_time_now_us(void);
 
-/// Makes the next `brd_sleep_until` return immediately. Call it from an interrupt that the main loop must act on.
+/// Makes the next `brd_sleep_until` return immediately. Every interrupt handler ends with this call, which also waits
+/// for the writes of the handler.
 void brd_wake(void);
 
 /// Sleeps until `until_us`, at the accuracy of a tick, or until `brd_wake` is called. A call of `brd_wake` since the

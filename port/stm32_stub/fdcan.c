@@ -202,12 +202,12 @@ int brd_fdcan_send(void *context, const iw_can_frame_t *frames, uint32_t count) 
 }
 
 /// Returns true once after a loss of frames, with the report of the controller in `*out_frame`. The core counts it.
-static bool tell_loss(brd_fdcan_t *self, iw_can_frame_t *out_frame) {
+static bool report_loss(brd_fdcan_t *self, iw_can_frame_t *out_frame) {
     const uint32_t losses = self->overruns + self->lost + self->exceptions;
-    if (losses == self->losses_told) {
+    if (losses == self->losses_reported) {
         return false;
     }
-    self->losses_told = losses;
+    self->losses_reported = losses;
     *out_frame = (iw_can_frame_t){.id = IW_CAN_ERROR, .kind = IW_CAN_RECEIVED};
     return true;
 }
@@ -216,7 +216,7 @@ int brd_fdcan_receive(void *context, iw_can_frame_t *out_frame) {
     brd_fdcan_t *const self = context;
     iw_can_frame_t frame;
     uint8_t epoch;
-    if (tell_loss(self, out_frame)) {
+    if (report_loss(self, out_frame)) {
         return 1;
     }
     while (brd_frame_ring_take(&self->ring, &frame, &epoch)) {

@@ -69,7 +69,7 @@ typedef struct {
     volatile uint32_t overruns; ///< Number of times that a frame arrived while the controller's FIFO was full.
     volatile uint32_t lost;     ///< Frames and echoes that were lost because the ring was full.
     uint32_t exceptions;        ///< Protocol exceptions: FD frames of other nodes.
-    uint32_t losses_told;       ///< Losses and exceptions that `brd_fdcan_receive` has reported.
+    uint32_t losses_reported;   ///< Losses and exceptions that `brd_fdcan_receive` has reported.
     uint32_t bus_offs;          ///< Bus-offs since the start.
     uint32_t resets;            ///< Resets of the controller by this driver since the start.
     uint8_t epoch;              ///< Counts purges: echoes from before a purge are not delivered.

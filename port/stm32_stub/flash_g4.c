@@ -31,6 +31,9 @@ typedef struct {
 #define DBANK  (1U << 22)   // OPTR
 #define ECCD   (0xAU << 28) // ECCR: two wrong bits in the lower or upper half of what was read.
 
+#define RCC_CIFR (*(volatile uint32_t *)(BRD_RCC_ADDRESS + 0x1CU)) // 7.4
+#define CSSF     (1U << 8)                                         // The crystal failed.
+
 #define PAGE_BYTES     0x1000U
 #define PAGE_TWO_BANKS 124U // Of bank 2, whose pages have 2 KiB.
 #define PAGE_SINGLE    126U
@@ -39,52 +42,64 @@ typedef struct {
 // Erasing takes at most 25 ms, and a poll at least 8 cycles.
 #define POLLS_MAX (BRD_CORE_HZ / 8U / 20U)
 
-static volatile bool is_broken; // The NMI sets it.
+static volatile bool is_reading; // Only while the store is read, a bad word is no fault.
+static volatile bool is_broken;  // The NMI sets it.
 
 void brd_nmi_handler(void);
 
 /// A word whose write was interrupted can have two wrong bits, and reading it raises the NMI (3.3). Without this
-/// handler each start would end in a reset while it searches the store. Every other NMI is a failure of the crystal.
+/// handler each start would end in a reset while it searches the store. ECCR does not decide, because the interruption
+/// can have damaged its contents too (ES0430 2.2.3). Every other NMI is a bad word of the program, or a failure of the
+/// crystal.
 void brd_nmi_handler(void) {
-    const uint32_t eccr = FLASH->ECCR;
-    if ((eccr & ECCD) == 0U) {
+    if (!is_reading || (RCC_CIFR & CSSF) != 0U) {
         brd_fault_store(NULL);
     }
-    FLASH->ECCR = eccr; // Writing 1 clears a flag.
+    FLASH->ECCR |= ECCD; // Writing 1 clears a flag.
     is_broken = true;
+    __asm volatile("dsb" ::: "memory");
 }
 
 static volatile uint32_t *words_of(unsigned page, unsigned word) {
     return (volatile uint32_t *)(BRD_STORE_ADDRESS + page * PAGE_BYTES + 8U * word);
 }
 
-/// The NMI comes before the instruction after the barriers.
+/// The flash raises the NMI independently of the read. The read of its status register takes longer than the NMI needs.
 uint32_t brd_flash_read(unsigned page, unsigned word) {
     const volatile uint32_t *const at = words_of(page, word);
     is_broken = false;
+    is_reading = true;
     const uint32_t value = at[0];
     const uint32_t inverse = at[1];
+    __asm volatile("dsb" ::: "memory");
+    (void)FLASH->SR;
     __asm volatile("dsb\n isb" ::: "memory");
+    is_reading = false;
     const bool blank = value == UINT32_MAX && inverse == UINT32_MAX;
     return (!is_broken && (blank || inverse == ~value)) ? value : BROKEN;
 }
 
+/// Switches the data cache off until `end`: reading one bank while the other one is written can corrupt its contents
+/// (ES0430 2.2.2).
 static bool begin(uint32_t what) {
     if ((FLASH->CR & LOCK) != 0U) {
         FLASH->KEYR = KEY1;
         FLASH->KEYR = KEY2;
     }
+    if ((FLASH->CR & LOCK) != 0U) {
+        return false;
+    }
+    FLASH->ACR &= ~DCEN;
     FLASH->SR = FAULTS | EOP;
     FLASH->CR = what;
-    return (FLASH->CR & LOCK) == 0U;
+    return true;
 }
 
-/// Clears the data cache, which still contains the words from before the write (3.3).
+/// Clears the data cache, which still contains the words from before the write (3.3), and switches it on.
 static void empty_cache(void) {
-    const uint32_t acr = FLASH->ACR;
-    FLASH->ACR = acr & ~DCEN;
-    FLASH->ACR = (acr & ~DCEN) | DCRST;
-    FLASH->ACR = acr;
+    const uint32_t acr = FLASH->ACR & ~DCEN;
+    FLASH->ACR = acr | DCRST;
+    FLASH->ACR = acr | DCEN;
 }
 
 static bool end(void) {

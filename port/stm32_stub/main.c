@@ -26,12 +26,12 @@ void brd_exti0_handler(void) {
 
 /// Tries until the crystal runs. Until then the internal oscillator counts the time; lamp and console report the state.
 static void wait_for_crystal(void) {
-    bool is_told = false;
+    bool is_reported = false;
     brd_time_start(BRD_INTERNAL_HZ);
     brd_console_start(BRD_INTERNAL_HZ);
     while (!brd_clock_start()) {
-        if (!is_told && brd_time_now_us() > CRYSTAL_LATE_US) {
-            is_told = true;
+        if (!is_reported && brd_time_now_us() > CRYSTAL_LATE_US) {
+            is_reported = true;
             brd_report_no_crystal();
         }
         (void)brd_console_step();

@@ -24,7 +24,7 @@ void brd_report_no_crystal(void) {
     brd_console_text(" kHz yet: the bus is left alone until it runs\r\n");
 }
 
-static void tell_board(void) {
+static void report_board(void) {
     brd_console_text("iwheel " IWHEEL_VERSION " on " BRD_NAME ": clock ");
     brd_console_number(BRD_CORE_HZ / 1000000U);
     brd_console_text((BRD_CRYSTAL_IS_CLOCK != 0) ? " MHz from a signal of " : " MHz from a crystal of ");
@@ -42,7 +42,7 @@ static void tell_board(void) {
 }
 
 void brd_report_start(bool restarted) {
-    tell_board();
+    report_board();
     brd_console_text("; e-stop on");
     pin(BRD_ESTOP);
     brd_console_text(brd_pins_estop_high() ? ": pressed; " : ": released; ");
@@ -59,7 +59,7 @@ void brd_report_start(bool restarted) {
 }
 
 /// Uses the words of the gateway's protocol (docs/user/northbound.md), so that one manual covers both.
-static void tell_state(const iw_snapshot_t *seen, bool estop_pressed) {
+static void report_state(const iw_snapshot_t *seen, bool estop_pressed) {
     const iw_state_t state = seen->state;
     brd_console_text(iwn_state_name(state));
     if (state == IW_STATE_LATCHED || state == IW_STATE_STOPPING) {
@@ -91,7 +91,7 @@ void brd_report_step(const iw_snapshot_t *seen, bool estop_pressed) {
     }
     if (now != shown) {
         shown = now;
-        tell_state(seen, estop_pressed);
+        report_state(seen, estop_pressed);
     }
 }
 

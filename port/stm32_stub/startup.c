@@ -16,7 +16,8 @@ __attribute__((weak)) void brd_serial_usart_handler(void);
 __attribute__((weak)) void brd_serial_receive_handler(void);
 __attribute__((weak)) void brd_serial_transmit_handler(void);
 
-extern uint32_t brd_link_stack_top[], brd_link_data_load[], brd_link_data_start[], brd_link_data_end[];
+extern uint32_t brd_link_stack_top[], brd_link_data_load[], brd_link_data_end[];
+extern volatile uint32_t brd_link_data_start[];
 extern uint32_t brd_link_bss_start[], brd_link_bss_end[];
 
 /// Stores the cause and resets the chip after any fault, a failure of the crystal (NMI) or an unexpected exception. If
@@ -65,8 +66,10 @@ __attribute__((section(".vectors"), used)) static const brd_vector_t vectors[VEC
 /// this table at address 0.
 void brd_reset_handler(void) {
     SCB_VTOR = vectors;
+    // After a reset a G474 can lose the first write to its RAM, unless a read comes before (ES0430 2.2.7).
+    (void)brd_link_data_start[0];
     const uint32_t *from = brd_link_data_load;
-    for (uint32_t *to = brd_link_data_start; to < brd_link_data_end; to++, from++) {
+    for (volatile uint32_t *to = brd_link_data_start; to < brd_link_data_end; to++, from++) {
         *to = *from;
     }
     for (uint32_t *to = brd_link_bss_start; to < brd_link_bss_end; to++) {

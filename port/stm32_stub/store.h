@@ -3,9 +3,8 @@
 ///
 /// A page has slots. A record goes into the next blank slot and is valid if its CRC, which is written last, is right.
 /// So after a power cut at any time the store has the previous record or the new one. A slot that is neither blank nor
-/// valid is skipped. If blank slots run short the other page is erased, but only at a start: while the image runs
-/// nothing is ever erased. A record stalls the CPU for at most 16 ms (F103; F4: 6 ms), which is less than a step may be
-/// late.
+/// valid is skipped. Only a write with `may_erase` erases a page; the image requests that at its start, never while it
+/// runs. A record stalls the CPU for at most 16 ms (F103; F4: 6 ms), which is less than a step may be late.
 ///
 /// Wear: with a record at each power-on, the pages of an F103 are erased once in four power-ons. 10 000 erasures, the
 /// number that the manufacturer specifies, last for 40 000 power-ons.

@@ -3,9 +3,12 @@
 
 import asyncio
 import signal
+import threading
 import time
 import unittest
 import warnings
+from concurrent.futures import ThreadPoolExecutor
+from unittest import mock
 
 import pytest
 from rig import RigCase, now_us
@@ -24,6 +27,47 @@ class Async(RigCase):
 
         self.assertEqual(self.run_async(story()).left_mm_s, 200)
         self.assert_stood_by(now_us(), 0)
+
+    def test_stop_never_refused_in_another_event_loop(self):
+        wheels, armed, end = [], threading.Event(), threading.Event()
+
+        async def drive():
+            async with AsyncGateway(self.socket) as gateway:
+                wheels.append(await gateway.arm("server"))
+                await wheels[0].drive(200, 200)
+                armed.set()
+                while not end.is_set():
+                    await asyncio.sleep(0.02)
+
+        server = threading.Thread(target=asyncio.run, args=[drive()])
+        server.start()
+        armed.wait(5)
+        self.assertTrue(self.run_async(wheels[0].stop()))
+        self.assertEqual(self.run_async(wheels[0]._gateway.estop("button")), "latched")
+        end.set()
+        server.join()
+
+    def test_stop_never_waits_for_a_thread_of_the_executor(self):
+        async def story():
+            over = threading.Event()
+            loop = asyncio.get_running_loop()
+            loop.set_default_executor(ThreadPoolExecutor(1))
+            job = loop.run_in_executor(None, over.wait, 10)
+            try:
+                self.assertEqual(await asyncio.wait_for(AsyncGateway(self.socket).stop(), 3), "listening")
+                with mock.patch("threading.Thread.start", side_effect=RuntimeError("can't start new thread")):
+                    self.assertEqual(await AsyncGateway(self.socket).stop(), "listening")
+                cancelled = asyncio.ensure_future(AsyncGateway(self.socket).estop("cancelled"))
+                await asyncio.sleep(0)
+                cancelled.cancel()
+                await asyncio.sleep(0.2)
+                self.assertTrue(cancelled.cancelled())
+                self.assertEqual((await AsyncGateway(self.socket).status())["state"], "latched")
+            finally:
+                over.set()
+            await job
+
+        self.run_async(story())
 
     def test_a_cancelled_task_stops_the_wheels(self):
         async def drive():

@@ -176,7 +176,7 @@ class Cancelled(unittest.TestCase):
         signal.setitimer(signal.ITIMER_REAL, LOST_S)
         async with Stall() as stall:
             at = await way(task(path), seconds)
-            took = time.monotonic() - at
+            elapsed_s = time.monotonic() - at
         signal.setitimer(signal.ITIMER_REAL, 0)
         await asyncio.sleep(0.002)  # The stand-in reads the rest of the socket.
         for client in stand_in.clients[before:]:
@@ -184,7 +184,7 @@ class Cancelled(unittest.TestCase):
                 self.assertFalse(client.drove_since_stop(), "its block ended without a stop")
             self.assertFalse(client.may_drive, "still armed and connected")
             self.assertLessEqual(client.drives_since(at + stall.late), ON_ITS_WAY)
-        self.assertLess(took, END_S + stall.late, f"took {took * 1000:.1f} ms, of which the machine delayed it by {stall.late * 1000:.1f} ms")
+        self.assertLess(elapsed_s, END_S + stall.late, f"took {elapsed_s * 1000:.1f} ms, of which the machine delayed it by {stall.late * 1000:.1f} ms")
 
     def test_cancelled_at_any_instant_each_task_ends_and_stops(self):
         instants = random.Random(35)

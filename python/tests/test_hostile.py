@@ -58,7 +58,7 @@ class Impostor:
         self.folder.cleanup()
 
 
-def as_nobody(call):
+def as_stranger(call):
     """The text of the exception that the call raises in a child without root's rights."""
     reading, writing = os.pipe()
     child = os.fork()
@@ -280,7 +280,7 @@ class Hostile(unittest.TestCase):
         impostor = Impostor(b"")
         self.addCleanup(impostor.end)
         os.chmod(impostor.path, 0)
-        self.assertIn("this user may not use it; join its group", as_nobody(Gateway(impostor.path).status))
+        self.assertIn("this user may not use it; join its group", as_stranger(Gateway(impostor.path).status))
 
     def test_socket_of_the_environment_is_used(self):
         before = os.environ.get("IWHEEL_SOCKET")
@@ -302,9 +302,49 @@ class Hostile(unittest.TestCase):
             os.environ.pop("IWHEEL_SOCKET", None)
             self.assertEqual(default_socket(), drive)
             if os.geteuid() == 0:
-                self.assertIn(watch, as_nobody(Gateway().status))
+                self.assertIn(watch, as_stranger(Gateway().status))
             os.unlink(drive)
             self.assertEqual(default_socket(), watch)
+
+    def test_stop_does_not_disturb_requests_of_another_thread(self):
+        impostor = Impostor(b'{"id":1,"ok":true,"state":"stopping"}\n')
+        self.addCleanup(impostor.end)
+        with Gateway(impostor.path, timeout=0.3) as gateway:
+            gateway.status()
+            stopping = threading.Thread(target=gateway.stop)
+            stopping.start()
+            time.sleep(0.1)
+            gateway.status()  # This connection gives no second answer, so a stop through it would still wait.
+            stopping.join()
+
+    def test_stop_never_refused_next_to_other_gateways(self):
+        folder = tempfile.mkdtemp()
+        self.addCleanup(shutil.rmtree, folder)
+        with socket.socket(socket.AF_UNIX) as one:
+            one.bind(os.path.join(folder, "a-killed.sock"))
+        impostors = [Impostor(b"", hello=b"")] + [Impostor(b'{"id":1,"ok":true,"state":"latched"}\n') for _ in range(2)]
+        for name, impostor in zip(("b-hung.sock", "c.sock", "d.sock"), impostors, strict=True):
+            self.addCleanup(impostor.end)
+            os.symlink(impostor.path, os.path.join(folder, name))
+        with mock.patch("iwheel._wire.DEFAULT_FOLDER", folder), mock.patch.dict(os.environ):
+            os.environ.pop("IWHEEL_SOCKET", None)
+            with self.assertRaisesRegex(GatewayUnavailable, "several gateways run: b-hung.sock, c.sock, d.sock in"):
+                Gateway().status()
+            for stop in (Gateway(timeout=0.4).estop, lambda: asyncio.run(AsyncGateway(timeout=0.4).estop())):
+                for impostor in impostors:
+                    impostor.received.clear()
+                states = []
+                caller = threading.Thread(target=lambda stop=stop, states=states: states.append(stop()))
+                caller.start()
+                time.sleep(0.2)
+                self.assertTrue(caller.is_alive(), "nothing hung")
+                for impostor in impostors[1:]:
+                    self.assertIn(b"estop", b"".join(impostor.received))
+                caller.join()
+                self.assertEqual(states, ["latched"])
+            for name in ("b-hung.sock", "c.sock"):
+                os.unlink(os.path.join(folder, name))
+            self.assertEqual(default_socket(), os.path.join(folder, "d.sock"))
 
 
 if __name__ == "__main__":

@@ -12,12 +12,13 @@ import time
 import unittest
 import warnings
 from fractions import Fraction
+from unittest import mock
 
 import pytest
 from rig import SOURCES, RigCase, now_us
 
 from iwheel import AsyncGateway, ConnectionLost, Gateway, GatewayUnavailable, LeaseEnded, NoAnswer, ProtocolError, Refused
-from iwheel._wire import add_piece
+from iwheel._wire import PASSING, add_piece, reason_of
 
 BUDGET_MS = 987 + 100
 """Lease, period and ramp of the configuration of rig.py, and the delay that a busy machine adds."""
@@ -103,7 +104,7 @@ class Driving(RigCase):
             with self.assertRaises(LeaseEnded):
                 wheels.drive(300, 300)
 
-    def test_an_exception_in_the_block_stops_and_is_not_swallowed(self):
+    def test_exception_in_the_block_stops_and_is_raised(self):
         with self.assertRaises(ZeroDivisionError), Gateway(self.socket).arm() as wheels:
             wheels.drive_for(0.4, 300, 300)
             raise ZeroDivisionError
@@ -528,10 +529,72 @@ class Reading(RigCase):
             watcher = threading.Thread(target=lambda: list(gateway.events(timeout=0.5)))
             watcher.start()
             time.sleep(0.1)
-            with self.assertRaisesRegex(RuntimeError, "give each thread its own"):
+            with self.assertRaisesRegex(RuntimeError, "create one for each thread"):
                 gateway.status()
             watcher.join()
             gateway.status()
+
+    def test_stop_never_refused_while_a_thread_reads_events(self):
+        with Gateway(self.socket) as gateway:
+            wheels = gateway.arm("window with a stop button")
+            gateway.watch("stop")
+            wheels.drive(200, 200)
+            reader = threading.Thread(target=lambda: list(gateway.events(timeout=1.5)))
+            reader.start()
+            time.sleep(0.1)
+            self.assertTrue(wheels.stop())
+            self.assertEqual(gateway.stop(), "stopping")
+            self.assertEqual(gateway.estop("button"), "latched")
+            self.assertTrue(reader.is_alive(), "the stops waited for the reader")
+            reader.join()
+            self.assertIn("button", gateway.why()["sentence"])
+
+    def test_stop_ends_an_arm_that_waits(self):
+        other = Gateway(self.socket)
+        other.arm().drive_for(0.1, 200, 200)
+        other.close()  # The gateway now refuses arm for half a second.
+        outcomes = []
+
+        def arm(gateway):
+            try:
+                outcomes.append(gateway.arm(wait=5))
+            except Refused as refusal:
+                outcomes.append(refusal.error)
+
+        with Gateway(self.socket) as gateway:
+            waiting = threading.Thread(target=arm, args=[gateway])
+            waiting.start()
+            time.sleep(0.1)
+            gateway.stop()
+            waiting.join()
+
+        async def story():
+            gateway = AsyncGateway(self.socket)
+            waiting = asyncio.ensure_future(gateway._arm(None, False, 5))
+            await asyncio.sleep(0.1)
+            await gateway.stop()
+            with self.assertRaises(Refused) as caught:
+                await waiting
+            outcomes.append(caught.exception.error)
+            gateway.close()
+
+        asyncio.run(story())
+        self.assertEqual(len(outcomes), 2)
+        self.assertLessEqual(set(outcomes), {*PASSING})
+
+    def test_stop_before_the_reply_to_arm_ends_the_permission(self):
+        with Gateway(self.socket) as gateway:
+            ask = gateway._ask
+
+            def stop_meanwhile(cmd, **fields):
+                reply = ask(cmd, **fields)
+                Gateway.stop(gateway)
+                return reply
+
+            with mock.patch.object(gateway, "_ask", stop_meanwhile), mock.patch.object(gateway, "_stop", return_value={"state": "stopping"}):
+                wheels = gateway.arm()
+            with self.assertRaisesRegex(LeaseEnded, "stopped while it was requested"):
+                wheels.drive(200, 200)
 
     def test_a_signal_handler_may_stop_while_a_request_waits(self):
         with Gateway(self.socket) as gateway:
@@ -544,6 +607,31 @@ class Reading(RigCase):
                 states.append(next(gateway.events(timeout=1)).get("state"))
             self.assertIn("latched", states)
             self.assertEqual(gateway.status()["state"], "latched")
+
+    def test_estop_never_refused_for_its_reason(self):
+        class Mute:
+            def __str__(self):
+                raise ZeroDivisionError
+
+        seen = {
+            ValueError("sensor\n  lost"): "sensor lost",
+            None: None,
+            "": None,
+            " \t": None,
+            7: "7",
+            Mute(): "Mute (its text failed: ZeroDivisionError)",
+            "a\tb\x00\x7f\u2028c\u200e\u202ed\ud800e": "a b c d e",
+            "x" * 5000: "x" * 200,
+            "y" + "\u00e9" * 100: "y" + "\u00e9" * 99,
+            "\U0001f6d1" * 51: "\U0001f6d1" * 50,
+            '"\\' * 101: '"\\' * 100,
+        }
+        with Gateway(self.socket) as gateway:
+            for reason, shown in seen.items():
+                self.assertEqual(reason_of(reason), shown)
+                self.assertEqual(gateway.estop(reason), "latched")
+            self.assertIn("sensor lost", gateway.why()["sentence"])
+            self.assertEqual(asyncio.run(AsyncGateway(self.socket).estop(ValueError("two\nlines"))), "latched")
 
     def test_estop_latches_and_reset_leaves_it(self):
         with Gateway(self.socket) as gateway:

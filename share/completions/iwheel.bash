@@ -26,7 +26,7 @@ _iwheel_value() {
     --socket | --config | -c | --from | --learn | --gateway | --directory | --control | --script | --log | --output) echo FILE ;;
     --can) echo BUS && echo unix: ;;
     --estop) printf '%s\n' none FILE ;;
-    --to) printf '%s\n' mcap csv blf ;;
+    --to) printf '%s\n' mcap csv blf rosbag2 ;;
     --log-level) printf '%s\n' error warning info debug ;;
     --how | --for | --listen | --rate | --frames | --current | --seed | --uptime | --last | --since | --until | --wait) ;;
     *) return 1 ;;

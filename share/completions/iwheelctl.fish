@@ -44,7 +44,7 @@ function __iwheel_value
             echo none
             __fish_complete_path (commandline -ct)
         case --to
-            printf '%s\n' mcap csv blf
+            printf '%s\n' mcap csv blf rosbag2
         case --log-level
             printf '%s\n' error warning info debug
         case --how --for --listen --rate --frames --current --seed --uptime --last --since --until --wait

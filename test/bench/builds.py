@@ -38,13 +38,20 @@ def field(package, name):
     return subprocess.run(["dpkg-deb", "-f", package, name], capture_output=True, text=True, check=True).stdout.strip()
 
 
+def documents_kib(package):
+    """Size of the files in /usr/share/doc."""
+    contents = subprocess.run(["dpkg-deb", "-c", package], capture_output=True, text=True, check=True).stdout
+    rows = [line.split(maxsplit=5) for line in contents.splitlines()]
+    return sum(int(size) for _, _, size, _, _, name in rows if name.startswith("./usr/share/doc/")) / KIB_PER_MIB
+
+
 def packages():
     """Rows of the packages that test/debian/run has built; none if there are none."""
     found = sorted(path for path in PACKAGES.glob("*.deb") if "-dbgsym_" not in path.name)
     return [
         [
             f"package {field(path, 'Package')}",
-            f"{int(field(path, 'Installed-Size')) / KIB_PER_MIB:.2f} MiB installed, {path.stat().st_size / KIB_PER_MIB:.0f} KiB file",
+            f"{int(field(path, 'Installed-Size')) / KIB_PER_MIB:.2f} MiB installed, {documents_kib(path) / KIB_PER_MIB:.2f} MiB of it documents; {path.stat().st_size / KIB_PER_MIB:.0f} KiB file",
         ]
         for path in found
     ]

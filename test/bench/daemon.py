@@ -195,9 +195,9 @@ def back_after_kill(pair):
     pair.gateway = pair.start()
     client = Client(pair.northbound)
     client.ask(cmd="hello")
-    took = time.monotonic() - killed
+    duration_s = time.monotonic() - killed
     client.close()
-    return took
+    return duration_s
 
 
 def measure(build):

@@ -6,6 +6,7 @@ usage: test/bench/test_loop.py [unittest's arguments]
 """
 
 import sys
+import threading
 import types
 import unittest
 from pathlib import Path
@@ -37,6 +38,14 @@ class Client:
         pass
 
 
+def drivers_ended():
+    """The figure of a trial that waits, on a machine of any speed, until the clients were refused."""
+    for thread in threading.enumerate():
+        if thread not in (threading.main_thread(), threading.current_thread()):
+            thread.join(10)
+    return 1
+
+
 class Stopped(unittest.TestCase):
     def setUp(self):
         for name, value in (("SETTLE_S", 0.05), ("COMMANDS_S", 1000)):
@@ -49,7 +58,7 @@ class Stopped(unittest.TestCase):
         pair = types.SimpleNamespace(northbound="none", gateway=types.SimpleNamespace(poll=lambda: None))
         witness = types.SimpleNamespace(stalls=lambda _begin_us, _end_us: list(stalls))
         with self.assertRaises(RuntimeError) as raised:
-            loop.trial(pair, type("Made", (Client,), client), "driving", lambda: 1, witness)
+            loop.trial(pair, type("Made", (Client,), client), "driving", drivers_ended, witness)
         return str(raised.exception)
 
     def test_gateway_that_stops_is_asked_why(self):

@@ -35,12 +35,13 @@ class Operator:
         self.seen = 0
 
     def pump(self, seconds):
-        """Reads what is there; False once the program's end of the terminal is closed."""
+        """Reads what is there; False, after that time, once the program's end of the terminal is closed."""
         if not select.select([self.parent], [], [], seconds)[0]:
             return True
         try:
             data = os.read(self.parent, 65536)
         except OSError:
+            time.sleep(seconds)  # Callers that continue must wait: in virtual time no time passes while they compute.
             return False
         self.raw += data
         self.text += data.decode(errors="replace").replace("\r\n", "\n")

@@ -420,7 +420,7 @@ class NoBox(WithRig):
     config = {"record": {"blackbox_s": 0}}
 
     def test_recording_of_0_s_writes_no_file_and_why_has_frames(self):
-        self.assertEqual(["iwheel-gateway"], sorted({*children(self.rig.gateway.child.pid), "iwheel-gateway"} - {"iwheel-keeper"}))
+        self.assertEqual(["iwheel-gateway"], sorted({*children(self.rig.gateway.child.pid), "iwheel-gateway"} - {"iwheel-store"}))
         self.assertTrue(self.client.request("estop")["ok"])
         time.sleep(0.5)
         self.assertGreater(len(self.why()["frames_before"]), 20)

@@ -125,7 +125,7 @@ class Bringup(unittest.TestCase):
 
     def weigh(self, operator, side, mass_kg):
         operator.answer(f"put on the {side} handle", str(mass_kg))
-        operator.answer("off both handles", "")
+        operator.answer("from both handles", "")
         operator.expect("measuring")
         operator.expect("put the mass on")
         self.rig.sim.ask(f"load {side} {mass_kg * GRAVITY:.2f}")
@@ -146,7 +146,7 @@ class Bringup(unittest.TestCase):
     def turn_around(self, operator, *commands, turns=3):
         """The machine as a whole; by other commands, if it does not go as it should."""
         operator.answer("How many full turns", str(turns))
-        operator.answer("Point it at the mark", "")
+        operator.answer("Point the machine at the mark", "")
         operator.expect("press Enter ...")
         for command in commands or (f"turn {turns}",):
             self.rig.sim.ask(command)
@@ -177,7 +177,7 @@ class Bringup(unittest.TestCase):
 
     def push(self, operator, distance_m, mirrored):
         operator.answer("Distance in m", str(distance_m))
-        operator.answer("Stand at the start", "")
+        operator.answer("Place the machine at the start mark", "")
         operator.expect("press Enter ...")
         for side in ("left", "right"):
             self.rig.sim.ask(f"push {side} {-distance_m if side in mirrored else distance_m}")
@@ -300,7 +300,7 @@ class Bringup(unittest.TestCase):
             ("setpoint_type", "commanded 100 mm/s, measured"),
             ("force_unit_left", r"5\.00 kg changed"),
             ("mount_sign_left", "saw it turn backwards with invert = no"),
-            ("current_role", "500 mA alone and 100 mm/s alone turned no wheel, both together did"),
+            ("current_role", "500 mA alone and 100 mm/s alone turned no wheel, both together turned both"),
         ):
             self.assertRegex(entries[item]["reason"], number)
 
@@ -399,6 +399,30 @@ class Bringup(unittest.TestCase):
         operator.expect("STOPPED: a key was pressed")
         late = [frame for frame in self.moving() if frame[0] > pressed_us + 150_000]
         self.assertFalse(late, "nonzero setpoints after the key")
+        operator.answer("Try again?", "q")
+        self.assertEqual(1, self.leave(operator))
+
+    def test_key_before_or_after_the_motion_stops_the_wheels_too(self):
+        operator = self.begin()
+        operator.expect("types to try")
+        operator.expect("] ")
+        operator.type("1\n ")  # The second key comes while the trial gateway starts.
+        operator.expect("did not start: a key was pressed")
+        self.rig.sim.ask("push left 3")
+        operator.answer("Try again?", "y")
+        operator.expect("any key stops it")
+        time.sleep(0.3)
+        operator.type(" ")  # The program still waits until the wheel is at standstill.
+        operator.expect("did not start: a key was pressed", 2)
+        self.assertFalse(self.moving(), "setpoints after a key that came before the motion")
+        self.wait_until_stands()
+        operator.answer("Try again?", "y")
+        operator.expect("any key stops it")
+        deadline = time.monotonic() + 10
+        while not (self.moving() and self.rig.bus.setpoints()[-1][2] == 0) and time.monotonic() < deadline:
+            operator.pump(0.02)
+        operator.type(" ")  # The zeros of the stop are still sent.
+        operator.expect("STOPPED: a key was pressed", 3)
         operator.answer("Try again?", "q")
         self.assertEqual(1, self.leave(operator))
 
@@ -526,7 +550,11 @@ class Bringup(unittest.TestCase):
     def test_gear_from_wrong_or_missing_turns_is_not_concluded(self):
         operator = self.begin(gear=True)
         operator.answer("Turn the wheels by hand?", "y")
-        for pushes, expected in ((("push right 3.6",), "RIGHT"), ((), "are no gear"), (("push left 3.6", "push left -1.8", "push left 1.8"), "back and forth")):
+        for pushes, expected in (
+            (("push right 3.6",), "RIGHT"),
+            ((), "fit no gear ratio"),
+            (("push left 3.6", "push left -1.8", "push left 1.8"), "back and forth"),
+        ):
             operator.expect("press Enter ...")
             for push in pushes:
                 self.rig.sim.ask(push)
@@ -566,7 +594,7 @@ class Bringup(unittest.TestCase):
         operator = self.begin()
         operator.answer("types to try", "1")
         operator.answer("Did both wheels turn", "y")
-        operator.expect("noted as not confirmed")
+        operator.expect("notes it as not confirmed")
         operator.answer("current_role", "q")
         self.assertEqual(1, self.leave(operator))
 
@@ -586,7 +614,7 @@ class Bringup(unittest.TestCase):
         self.rig.sim.ask("block both")
         operator.seen -= len("Did both wheels turn")
         operator.answer("Did both wheels turn", "y")
-        operator.expect("unless both wheels turn, there is no result")
+        operator.expect("the result counts only if both wheels turn")
         operator.expect("Now no wheel turned")
         self.rig.sim.ask("unblock both")
         self.assertEqual("?", self.offered(operator, "current_role"))
@@ -595,7 +623,7 @@ class Bringup(unittest.TestCase):
         operator.answer("Measure the force?", "n")
         operator.answer("Distance in m", "")
         operator.answer("How many full turns", "")
-        self.assertEqual("noted: typed in; the wheels did not show it", self.write(operator)["current_role"])
+        self.assertEqual("noted: typed by the operator; the wheels did not show it", self.write(operator)["current_role"])
         self.assertNotIn("confirm current_role", operator.text)
 
     def test_current_turning_one_wheel_is_unconfirmed_setpoint(self):
@@ -627,13 +655,13 @@ class Bringup(unittest.TestCase):
         self.rig.sim.ask("block left")
         operator.seen -= len("Now both")
         operator.answer("Now both", "")
-        operator.expect("By the bus not both turned forwards")
+        operator.expect("The bus shows that a wheel did not turn forwards")
         self.rig.sim.ask("unblock left")
         self.look_at_signs(operator, mirrored=())
         operator.answer("Measure the force?", "q")
         self.assertEqual(1, self.leave(operator))
 
-    def test_wheel_that_turns_untold_ends_the_signs(self):
+    def test_wheel_that_turns_uncommanded_ends_the_signs(self):
         operator = self.begin()
         self.drive_through(operator, signs=False)
         operator.expect("Watch the left wheel")
@@ -649,14 +677,14 @@ class Bringup(unittest.TestCase):
         self.look_at_signs(operator, mirrored=())
         operator.answer("Measure the force?", "y")
         operator.answer("put on the left handle", "5")
-        operator.answer("off both handles", "")
+        operator.answer("from both handles", "")
         operator.expect("put the mass on")
         self.rig.sim.ask("raw left 32767")
         operator.type("\n")
         operator.expect("at the end of its range")
         operator.answer("Try again?", "n")
         operator.answer("put on the right handle", "5")
-        operator.answer("off both handles", "")
+        operator.answer("from both handles", "")
         operator.expect("put the mass on")
         self.rig.sim.ask("load right 49")
         operator.type("\n")
@@ -686,7 +714,7 @@ class Bringup(unittest.TestCase):
         self.turn_by_hand(operator, 192)
         self.drive_through(operator)
         operator.answer("Distance in m", "3")
-        operator.answer("Stand at the start", "")
+        operator.answer("Place the machine at the start mark", "")
         operator.expect("press Enter ...")
         for command in ("push left 3", "push right 3.3"):
             self.rig.sim.ask(command)
@@ -702,7 +730,7 @@ class Bringup(unittest.TestCase):
         self.assertRegex(found["track_mm"], "^noted: 3 full turns by hand: .* ticks; the radius is assumed$")
         self.assertNotIn("confirm track", operator.text)
 
-    def test_track_is_not_concluded_from_what_is_no_turn_on_the_spot(self):
+    def test_track_is_concluded_only_from_a_turn_on_the_spot(self):
         operator = self.begin()
         self.drive_through(operator)
         operator.answer("Distance in m", "")
@@ -711,14 +739,14 @@ class Bringup(unittest.TestCase):
             (3, ("turn 0.5",), "Too few ticks"),
             (3, ("turn 1", "turn -0.5", "turn 1"), "back and forth"),
             (3, ("push right 4", "push left -1.5"), "moved away"),
-            (20, ("turn 1",), "no track between 200"),
+            (20, ("turn 1",), "outside 200"),
         ):
             self.turn_around(operator, *commands, turns=turns)
             operator.expect(expected)
         operator.answer("How many full turns", "2.5")
         operator.expect("a number of full turns")
         self.turn_around(operator, "turn 3", turns=2)  # Counted wrongly.
-        operator.expect("No track was configured. A tape")
+        operator.expect("No track was configured. Check the number of turns")
         operator.answer("Use that?", "")
         operator.answer("How many full turns", "")
         operator.expect("Without a track the gateway refuses arm: set track_mm under [wheels]")
@@ -760,7 +788,7 @@ class Bringup(unittest.TestCase):
 
     def begin_to_turn(self, operator):
         operator.answer("How many full turns", "3")
-        operator.answer("Point it at the mark", "")
+        operator.answer("Point the machine at the mark", "")
         operator.expect("press Enter ...")
         self.rig.sim.ask("turn 3")
         time.sleep(0.5)
@@ -818,8 +846,8 @@ class Bringup(unittest.TestCase):
 
     def test_saved_results_are_left_out_and_confirmed_at_the_end(self):
         operator = self.go_on(self.save(), same="y")
-        operator.expect("Step 4 of 10: confirmed by the earlier bringup; left out")
-        operator.expect("Step 5 of 10: confirmed by the earlier bringup; left out")
+        operator.expect("Step 4 of 10: confirmed by the earlier bringup; skipped")
+        operator.expect("Step 5 of 10: confirmed by the earlier bringup; skipped")
         self.look_at_signs(operator, mirrored=())
         operator.answer("Measure the force?", "n")
         operator.answer("Distance in m", "")
@@ -878,7 +906,7 @@ class Bringup(unittest.TestCase):
         self.look_at_signs(operator, mirrored=())
         operator.answer("Measure the force?", "y")
         operator.answer("put on the left handle", "5")
-        operator.answer("off both handles", "")
+        operator.answer("from both handles", "")
         operator.expect("measuring for 2 s")
         operator.type("\x03")
         self.ends_soon(operator)

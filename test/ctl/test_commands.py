@@ -159,6 +159,12 @@ class Json(unittest.TestCase):
         self.assertEqual((64, ""), (code, out))
         self.assertIn("name a FILE", err)
 
+    def test_unexpected_word_is_refused_by_the_verb_that_was_typed(self):
+        for verb in ("status", "stop", "disarm", "reset", "release", "ledger"):
+            code, out, err = run("--socket", "/nonexistent", verb, "extra")
+            expected = f'iwheelctl: {verb} does not understand "extra"; see: iwheelctl {verb} --help'
+            self.assertEqual((69 if verb in ("stop", "disarm") else 64, "", expected), (code, out, err.splitlines()[-1]))
+
 
 class Help(unittest.TestCase):
     def test_help_of_a_verb_is_the_page_of_its_option(self):
@@ -278,10 +284,10 @@ class Completion(unittest.TestCase):
 
     def test_lists_are_those_of_the_program(self):
         self.assertLessEqual(set(ITEMS), set(listed("confirm")))
-        ledger = subprocess.run(
+        counted = subprocess.run(
             ["grep", "-c", "IW_ASSUMPTION_", os.path.join(ROOT, "core", "include", "iwheel", "types.h")], capture_output=True, text=True, check=True
         )
-        self.assertGreater(int(ledger.stdout), len(ITEMS))
+        self.assertGreater(int(counted.stdout), len(ITEMS))
         for verb in verbs():
             for word in listed(verb):
                 if word.startswith("--"):

@@ -198,6 +198,7 @@ class Others(unittest.TestCase):
             (("--plain", "--web"), "leave out --plain"),
             (("--lan",), "./demo --web --lan"),
             (("--fleet", "--lan"), "./demo --web --lan"),
+            (("--ros", "--web"), "all but one of"),
         ):
             done = subprocess.run([os.path.join(ROOT, "demo"), *words], capture_output=True, text=True, timeout=20, check=False)
             self.assertEqual(done.returncode, 64, (words, done.stderr))

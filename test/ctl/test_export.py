@@ -20,8 +20,12 @@ can = pytest.importorskip("can")
 pandas = pytest.importorskip("pandas")
 make_reader = pytest.importorskip("mcap.reader").make_reader
 
+Reader = pytest.importorskip("rosbags.rosbag2").Reader
+get_typestore, Stores = (getattr(pytest.importorskip("rosbags.typesys"), name) for name in ("get_typestore", "Stores"))
+
 HERE = os.path.dirname(os.path.abspath(__file__))
 ROOT = os.path.dirname(os.path.dirname(HERE))
+pytestmark = pytest.mark.exact
 PROGRAM = os.path.join(os.environ["IWHEEL_BUILD"], "app", "ctl", "iwheelctl")
 GOLDEN = os.path.join(ROOT, "test", "recordings", "estop.log")
 NUMBERS = [f"{side}_{name}" for side in ("left", "right") for name in ("commanded_m_s", "applied_m_s", "measured_m_s", "net_force_N")]
@@ -143,6 +147,29 @@ class Export(unittest.TestCase):
             expected = {name.removeprefix("left_"): row[name] for name in NUMBERS[:4] if not pandas.isna(row[name])}
             self.assertEqual(value, expected)
 
+    def test_rosbag2_has_the_values_in_messages_of_ros(self):
+        table = self.table()
+        samples = table[table["event"].isna()]
+        events = table[["event", "text"]].dropna(subset="event").fillna("")
+        store = get_typestore(Stores.ROS2_JAZZY)
+        by_topic = {}
+        with Reader(self.export(GOLDEN, "rosbag2")) as reader:
+            for connection, time_ns, data in reader.messages():
+                by_topic.setdefault(connection.topic, []).append((time_ns, store.deserialize_cdr(data, connection.msgtype)))
+        for column in NUMBERS:
+            side, name = column.split("_", 1)
+            known = samples[~samples[column].isna()]
+            force = name == "net_force_N"
+            messages = by_topic.pop(f"/{side}/{'wrench' if force else name.removesuffix('_m_s')}")
+            self.assertEqual([message.wrench.force.x if force else message.twist.linear.x for _, message in messages], list(known[column]))
+            self.assertEqual([round(time_ns / 1000) for time_ns, _ in messages], [round(time * 1e6) for time in known["time_s"]])
+            stamps = [message.header.stamp.sec * 10**9 + message.header.stamp.nanosec for _, message in messages]
+            self.assertEqual(stamps, [time_ns for time_ns, _ in messages])
+            self.assertEqual(messages[0][1].header.frame_id, f"{side}_{'handle' if force else 'wheel'}")
+        self.assertEqual([message.data for _, message in by_topic.pop("/state")], ["listening", "armed", "latched"])
+        self.assertEqual([message.data for _, message in by_topic.pop("/event")], list(events["event"] + ": " + events["text"]))
+        self.assertEqual(by_topic, {})
+
     def test_blf_has_the_frames_of_the_recording(self):
         def known(frame):
             return round(frame.timestamp * 1e6), frame.arbitration_id, bytes(frame.data), frame.is_extended_id, frame.is_rx
@@ -152,7 +179,7 @@ class Export(unittest.TestCase):
         self.assertGreater(len(written), 1000)
 
     def test_existing_file_stays_as_it_is(self):
-        for to in ("csv", "mcap", "blf"):
+        for to in ("csv", "mcap", "blf", "rosbag2"):
             path = self.write(f"estop.{to}", "mine")
             code, said = self.run_export(GOLDEN, "--to", to)
             self.assertNotEqual(code, 0)
@@ -162,7 +189,7 @@ class Export(unittest.TestCase):
 
     def test_recording_that_is_none_leaves_no_file(self):
         empty = self.write("empty.log", "")
-        for recording, to in ((empty, "csv"), (empty, "mcap"), (empty, "blf"), ("none.log", "csv"), ("none.log", "blf")):
+        for recording, to in ((empty, "csv"), (empty, "mcap"), (empty, "blf"), (empty, "rosbag2"), ("none.log", "csv"), ("none.log", "blf")):
             code, said = self.run_export(recording, "--to", to)
             self.assertEqual(code, 65, (recording, to, said))
             self.assertNotIn("Traceback", said)
@@ -179,9 +206,10 @@ class Export(unittest.TestCase):
         self.assertIn("line 81 is no frame", said)
 
     def test_missing_library_is_named_with_its_fix(self):
-        for to, package in (("mcap", "mcap"), ("blf", "python-can")):
-            os.makedirs(os.path.join(self.folder, to, {"mcap": "mcap", "blf": "can"}[to]))
-            with open(os.path.join(self.folder, to, {"mcap": "mcap", "blf": "can"}[to], "__init__.py"), "w", encoding="utf-8") as file:
+        for to, package in (("mcap", "mcap"), ("blf", "python-can"), ("rosbag2", "rosbags")):
+            module = os.path.join(self.folder, to, {"blf": "can"}.get(to, package))
+            os.makedirs(module)
+            with open(os.path.join(module, "__init__.py"), "w", encoding="utf-8") as file:
                 file.write("raise ImportError('absent')\n")
             self.environment["PYTHONPATH"] = os.pathsep.join([os.path.join(self.folder, to), os.path.join(ROOT, "python", "src")])
             code, said = self.run_export(GOLDEN, "--to", to)

@@ -230,7 +230,7 @@ class Showing(WithGateway):
         restart = ("ip link set can7 down; ip link set can7 up", "systemctl enable --now iwheel-can-restart@can7.path")
 
         class Stalled(FakeGateway):
-            heard, bus = True, "can7"
+            online, bus = True, "can7"
 
             def on_status(self, _connection, _request):
                 return {
@@ -240,7 +240,7 @@ class Showing(WithGateway):
                         cause="send_stalled",
                         present=["send_stalled"],
                         left=wheel(),
-                        right=wheel(heard=self.heard),
+                        right=wheel(heard=self.online),
                         bus={"name": self.bus, "state": "active"},
                     ),
                 }
@@ -250,8 +250,8 @@ class Showing(WithGateway):
 
         gateway = self.serve(Stalled)
         doctor = ("doctor", "--no-press", "--listen", "200ms")
-        for heard, bus in ((True, "can7"), (False, "can7"), (True, "unix:/nowhere")):
-            gateway.heard, gateway.bus = heard, bus
+        for online, bus in ((True, "can7"), (False, "can7"), (True, "unix:/nowhere")):
+            gateway.online, gateway.bus = online, bus
             outputs = {words[0]: self.ctl(*words, gateway=gateway)[1] for words in (("status",), ("why",), doctor)}
             findings = json.loads(self.ctl("--json", *doctor, gateway=gateway)[1])["findings"]
             (finding,) = (finding for finding in findings if finding["check"] == "send_stalled")
@@ -260,8 +260,8 @@ class Showing(WithGateway):
             for what, text in outputs.items():
                 text = " ".join(text.split())
                 for command in restart:
-                    self.assertEqual(heard and bus == "can7", command in text, (what, text))
-                self.assertEqual(not (heard and bus == "can7"), "check the wheels' power and the cable" in text, (what, text))
+                    self.assertEqual(online and bus == "can7", command in text, (what, text))
+                self.assertEqual(not (online and bus == "can7"), "check the wheels' power and the cable" in text, (what, text))
 
     def test_why_of_setpoint_acknowledged_since_names_no_fix(self):
         class Cleared(FakeGateway):
@@ -472,6 +472,62 @@ class Asking(WithGateway):
             self.assertEqual(0, self.ctl(*words)[0])
             self.assert_one_request(wanted)
 
+    def test_stop_with_a_mistake_in_its_words_stops_and_is_usage(self):
+        for words, cmd in (
+            (["stop", "now"], "stop"),
+            (["disarm", "--for", "2s"], "stop"),
+            (["-x", "stop", "now"], "stop"),
+            (["stop", "--"], "stop"),
+            (["--json", "stop", "--socket"], "stop"),
+            (["estop", ""], "estop"),
+            (["--jsn", "estop"], "estop"),
+        ):
+            self.gateway.requests.clear()
+            code, out, err, _ = self.ctl(*words)
+            self.assertEqual((64, 1), (code, err.count("\n")), (words, err))
+            self.assertIn("stopping" if cmd == "stop" else "latched", out)
+            self.assert_one_request({"cmd": cmd})
+        self.gateway.requests.clear()
+        self.assertEqual((64, ""), self.ctl("stop", "--help", "")[:2])
+        self.assertEqual(69, run("--socket", "/nonexistent", "stop", "now")[0])
+        self.assertEqual([], self.gateway.requests)
+
+    def test_stop_without_socket_stops_each_of_several_gateways(self):
+        class Hung(FakeGateway):
+            def greet(self, connection):
+                time.sleep(3)
+
+        other, hung = self.serve(FakeGateway), self.serve(Hung)
+        folder = tempfile.TemporaryDirectory(dir=os.path.dirname(self.gateway.folder.name))
+        self.addCleanup(folder.cleanup)
+        os.link(self.gateway.path, os.path.join(folder.name, "can0.sock"))
+        with socket.socket(socket.AF_UNIX) as killed:
+            killed.bind(os.path.join(folder.name, "dead.sock"))
+
+        def found(*words):
+            """In a name space in which the folder is that of the gateways' sockets."""
+            mount = 'cd "$0" && mount -t tmpfs none /run && mkdir /run/iwheel && mount -c --bind . /run/iwheel && exec "$@"'
+            command = ["unshare", "--mount", "sh", "-c", mount, folder.name, PROGRAM, *words]
+            done = subprocess.run(command, capture_output=True, text=True, timeout=30, env=clean_environment(), check=False)
+            return done.returncode, done.stdout, done.stderr
+
+        if subprocess.run(["unshare", "--mount", "mount", "-t", "tmpfs", "none", "/run"], capture_output=True, check=False).returncode != 0:
+            self.skipTest("needs the right to mount")
+        self.assertEqual((0, ""), found("status")[::2])
+        for gateway, name in ((other, "can1.sock"), (hung, "can2.sock")):
+            os.link(gateway.path, os.path.join(folder.name, name))
+        code, _, err = found("status")
+        self.assertEqual((64, 3), (code, err.count("/run/iwheel/can")), err)
+        for verb, state in (("stop", "stopping"), ("estop", "latched")):
+            code, out, err = found(verb)
+            self.assertEqual(0, code, err)
+            self.assertEqual([f"/run/iwheel/can{i}.sock: {state}" for i in (0, 1)], sorted(line.split(": ")[0] + ": " + state for line in out.splitlines()))
+            self.assertIn("can2.sock: the stop failed", err)
+            self.assertEqual((1, 1), (self.gateway.count(verb), other.count(verb)))
+        self.gateway.close()
+        other.close()
+        self.assertEqual(75, found("stop")[0])
+
     def test_reason_that_is_no_text_still_stops(self):
         done = subprocess.run([PROGRAM.encode(), b"--socket", self.gateway.path.encode(), b"estop", b"\xff\xfe"], capture_output=True, check=False)
         self.assertEqual(0, done.returncode)
@@ -550,14 +606,13 @@ class Asking(WithGateway):
         self.assertEqual((1, ""), (code, out))
         self.assertEqual("iwheelctl: refused (estop_pressed): the e-stop is pressed; release the button\n", err)
 
-    def test_wrong_words_are_usage_and_reach_nobody(self):
+    def test_wrong_words_are_usage_and_are_not_sent(self):
         for words in (
             [],
             ["fly"],
             ["-x"],
             ["status", "x"],
             ["status", "--all"],
-            ["stop", "now"],
             ["reset", "1"],
             ["release", "1"],
             ["why", "me"],
@@ -667,7 +722,7 @@ class Driving(WithGateway):
         first = next(request for _, request in self.gateway.requests if request["cmd"] == "drive")
         self.assertEqual({"cmd": "drive", "left_mm_s": -300, "right_mm_s": 250, "id": first["id"]}, first)
 
-    def test_drive_past_a_reboot_reports_the_way_as_unknown(self):
+    def test_drive_past_a_reboot_reports_the_distance_as_unknown(self):
         class Rebooting(FakeGateway):
             def on_status(self, connection, request):
                 status = super().on_status(connection, request)

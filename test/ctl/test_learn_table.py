@@ -231,7 +231,7 @@ class Lacks(unittest.TestCase):
             speeds=(True, False),
         )
 
-    def test_learn_wheel_that_does_not_turn_speaks_against_the_type(self):
+    def test_learn_wheel_that_does_not_turn_contradicts_the_type(self):
         self.differs(
             {
                 "setpoint_type": (AGAINST, None),
@@ -247,7 +247,7 @@ class Lacks(unittest.TestCase):
     def test_learn_wheel_that_stutters_shows_no_type_and_no_scale(self):
         self.differs({"setpoint_type": OPEN, "current_role": OPEN, **self.both("speed_scale", "ticks_per_turn")}, stutters=True)
 
-    def test_learn_wheel_that_runs_at_zero_speaks_against_a_limit(self):
+    def test_learn_wheel_that_runs_at_zero_contradicts_a_limit(self):
         for which in ((True, False), (False, True)):
             self.differs({"current_role": (AGAINST, None), **({"force_unit left": OPEN} if which[0] else {"force_unit right": OPEN})}, runs_at_zero=which)
 
@@ -296,7 +296,7 @@ class Lacks(unittest.TestCase):
             _, out, _ = learn(Story(phases=("rest", phase)))
             self.assertIn(f"+ left: a {word} setpoint is measured as a {word} speed (the other direction: not recorded)", out)
 
-    def test_learn_signs_that_are_swapped_or_mixed_speak_against_it(self):
+    def test_learn_signs_that_are_swapped_or_mixed_contradict(self):
         self.differs({"feedback_sign right": (AGAINST, "no"), "pair": (AGAINST, None)}, signs=(1, -1))
         self.differs(self.both("feedback_sign", verdict=(AGAINST, None)), flips=True)
 

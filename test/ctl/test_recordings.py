@@ -546,7 +546,7 @@ class Replay(unittest.TestCase):
             file.write("(1.0) can0 100#00000000\n(601.0) can0 100#00000000\n(600.95) can0 100#00000000\n")
         code, out, _ = self.replay("--config", "estop.conf", name="gap.log")
         self.assertEqual(0, code)
-        self.assertIn("cut to 60 s", out)
+        self.assertIn("the gap is shortened to 60 s", out)
         self.assertIn("time goes back 1 times", out)
 
     def test_wrong_words_are_reported(self):

@@ -16,7 +16,7 @@ from harness import Rig, find_program
 from operator_at_terminal import Operator
 
 pyte = pytest.importorskip("pyte")  # PyPI, requirements/check.txt
-pytestmark = pytest.mark.native("a screen: in the kernel of the tests its first test does not end")
+pytestmark = pytest.mark.native("processor time: virtual time needs five times as much")
 BUILD = os.environ["IWHEEL_BUILD"]
 
 
@@ -52,7 +52,7 @@ class Top:
             if any(text in row for row in rows):
                 return self.screen_after(0.2)
             if time.monotonic() > end:
-                raise AssertionError(f"{text!r} is not on the screen:\n" + "\n".join(rows))
+                raise AssertionError(f"{text!r} is not on the screen; exit status {self.operator.process.poll()}:\n" + "\n".join(rows))
 
     def blocks(self, row):
         """The big letters: which cells of a row are painted."""
@@ -142,6 +142,25 @@ class WithWheels(unittest.TestCase):
         top.wait_for("stop: done, now stopping")
         rows = top.wait_for("last stop: ")
         self.assertTrue(any("client stop" in row for row in rows), rows)
+        self.assertEqual(0, top.end())
+
+    def test_keys_stop_without_a_connection(self):
+        class OnlyStops(FakeGateway):  # As a gateway with its maximum of clients: no greeting.
+            def greet(self, connection):
+                pass
+
+        gateway = OnlyStops()
+        self.addCleanup(gateway.close)
+        top = Top(gateway.path)
+        self.addCleanup(top.operator.close)
+        top.wait_for("does not answer")
+        for key, cmd, name in ((" ", "stop", "stop"), ("e", "estop", "e-stop")):
+            top.press(key)
+            top.wait_for(f"{name}: done")
+            self.assertEqual(1, gateway.count(cmd))
+        gateway.close()
+        top.press(" ")
+        top.wait_for("stop failed: no program listens")
         self.assertEqual(0, top.end())
 
     def test_keys_latch_and_reset(self):
@@ -244,7 +263,7 @@ class WithWheels(unittest.TestCase):
         top.screen_after(2.0)
         before = self.dots(top, (begin, begin + 17), (8, 98))
         self.rig.kill_gateway(signal.SIGKILL)
-        top.wait_for("waiting for its return")
+        top.wait_for("waiting for a gateway")
         top.screen_after(3.0)
         self.rig.start_gateway()
         top.wait_for("LEFT speed")
@@ -257,7 +276,7 @@ class WithWheels(unittest.TestCase):
         top = self.top()
         top.wait_for("LEDGER")
         self.rig.kill_gateway(signal.SIGKILL)
-        top.wait_for("waiting for its return")
+        top.wait_for("waiting for a gateway")
         rows = top.screen_after(0.3)
         self.assertFalse(any("mm/s" in row for row in rows), "no old speeds")
         self.assertEqual(" #   #  ###", top.blocks(1)[:11])  # N O

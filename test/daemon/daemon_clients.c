@@ -55,7 +55,7 @@ void clients_begin(uint64_t seed) {
 }
 
 /// Reports requests that wait: from now on the client does not know what the process reads, and an unread arm may still be carried out.
-static void say_what_waits(const client_t *client) {
+static void print_waiting(const client_t *client) {
     for (unsigned i = 0; i < client->marks; i++) {
         if (client->mark[i].what == SAID_ARM) {
             judge_said((unsigned)client->stream, SAID_ARM);
@@ -65,7 +65,7 @@ static void say_what_waits(const client_t *client) {
 
 static void hang_up(client_t *client, bool half) {
     if (client->stream >= 0) {
-        say_what_waits(client);
+        print_waiting(client);
         vk_stream_t *stream = &vk.stream[client->stream];
         stream->shut = true;
         stream->client_end = stream->client_end || !half;
@@ -229,7 +229,7 @@ static void drive(client_t *client) {
                  client->task.a, client->task.b);
 }
 
-static void begin_anew(client_t *client) {
+static void begin_again(client_t *client) {
     client->step = STEP_RESET;
     client->driving_us = IW_NEVER;
     client->next_us = vk.now_us + AGAIN;
@@ -286,12 +286,12 @@ static void run_driver(client_t *client) {
             client->driving_us = vk.now_us;
             drive(client);
         } else if (!waits) {
-            begin_anew(client);
+            begin_again(client);
         }
         break;
     case STEP_DRIVE:
         if (client->answer == 0 || (client->answer < 0 && !waits)) {
-            begin_anew(client);
+            begin_again(client);
         } else {
             drive(client);
         }

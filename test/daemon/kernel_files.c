@@ -189,7 +189,7 @@ int __wrap_fchmodat(int folder, const char *name, mode_t mode, int flags) {
     return (int)vk_done(0);
 }
 
-static int tell_status(int file, struct stat *out_status) {
+static int print_status(int file, struct stat *out_status) {
     if (file < 0) {
         return -1;
     }
@@ -208,7 +208,7 @@ int __wrap_fstat(int fd, struct stat *out_status) {
         *out_status = (struct stat){.st_mode = S_IFIFO | 0600};
         return (int)vk_done(0);
     }
-    return tell_status(vk_fd(fd)->number, out_status);
+    return print_status(vk_fd(fd)->number, out_status);
 }
 
 int __wrap_fstatat(int folder, const char *name, struct stat *out_status, int flags) {
@@ -216,12 +216,12 @@ int __wrap_fstatat(int folder, const char *name, struct stat *out_status, int fl
     (void)flags;
     (void)vk_call("fstatat", NULL);
     resolve(folder, name, path);
-    return tell_status(find(path), out_status);
+    return print_status(find(path), out_status);
 }
 
 int __wrap_lstat(const char *path, struct stat *out_status) {
     (void)vk_call("lstat", NULL);
-    return tell_status(find(path), out_status);
+    return print_status(find(path), out_status);
 }
 
 int __wrap_stat(const char *path, struct stat *out_status) {

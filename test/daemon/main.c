@@ -59,7 +59,7 @@ static bool enough(void) {
     return (double)sum.simulated_us / US_PER_HOUR >= wanted_hours;
 }
 
-static void tell_sum(void) {
+static void print_sum(void) {
     printf("events:");
     for (unsigned kind = 0; kind < EV_KINDS; kind++) {
         printf("%s %s %u", (kind > 0U) ? "," : "", scenario_kind_name(kind), (unsigned)sum.events[kind]);
@@ -72,7 +72,7 @@ static void tell_sum(void) {
 }
 
 static const campaign_t campaign = {&scenario.count, scenario.event, draw,    play, print, add,
-                                    enough,          tell_sum,       TRACE_US};
+                                    enough,          print_sum,      TRACE_US};
 
 static int play_one(uint64_t seed, bool trace, bool events) {
     draw(seed);
@@ -82,7 +82,7 @@ static int play_one(uint64_t seed, bool trace, bool events) {
     const verdict_t verdict = play(trace ? 0U : IW_NEVER);
     const bool good = verdict.rule == 0U;
     if (!good) {
-        campaign_tell_failure(&campaign, seed, &verdict);
+        campaign_print_failure(&campaign, seed, &verdict);
     }
     printf("seed %llu hash %016llx, %.1f s, %llu calls of which %llu failed, %u lives\n", (unsigned long long)seed,
            (unsigned long long)result.hash, (double)result.simulated_us / 1e6, (unsigned long long)result.calls,
@@ -91,7 +91,7 @@ static int play_one(uint64_t seed, bool trace, bool events) {
     return good ? EXIT_SUCCESS : EXIT_FAILURE;
 }
 
-static void tell_kills(void) {
+static void print_kills(void) {
     printf("| killed at | kills | nonzero in force | zeros after the start, worst | after the kill, worst "
            "|\n|---|---:|---:|---:|---:|\n");
     for (unsigned phase = 0; phase < AT_PHASES; phase++) {
@@ -109,10 +109,10 @@ static void tell_kills(void) {
 static int kill_many(uint64_t seed, uint32_t lives) {
     scenario_kills(&scenario, seed, lives);
     const verdict_t verdict = play(IW_NEVER);
-    tell_kills();
+    print_kills();
     const bool good = verdict.rule == 0U;
     if (!good) {
-        campaign_tell_broken(seed, &verdict);
+        campaign_print_broken(seed, &verdict);
         (void)play((verdict.broken_us > TRACE_US) ? verdict.broken_us - TRACE_US : 0U);
     }
     printf("%u passed, %d failed, 0 skipped\n", good ? (unsigned)lives : 0U, !good);

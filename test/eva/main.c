@@ -245,7 +245,6 @@ static void observe(iw_side_t side) {
     iw_observation_step(&observation, &gateway, &seen);
     (void)iw_cause_latches((iw_cause_t)Frama_C_interval(IW_CAUSE_NONE, IW_CAUSES - 1));
     (void)iw_permit_present(&gateway.permit, now_us);
-    (void)iw_assumption_entry(&gateway.assumptions, IW_ASSUMPTION_DLC);
 }
 
 /// Functions outside the loop of a gateway: the codec's other direction, the bit timing.

@@ -89,7 +89,7 @@ def play(command, core, limit_s):
             stdout=output,
             stderr=subprocess.DEVNULL,
             cwd=core.folder,
-            env={**os.environ, "LD_LIBRARY_PATH": str(core.folder), NUMBER: str(core.number)},
+            env={**os.environ, "LD_LIBRARY_PATH": str(core.folder), NUMBER: str(core.number), "IWHEEL_FIRST_FAILURE": "1"},
             preexec_fn=limit,
         )
         _, status, usage = os.wait4(child.pid, 0)

@@ -78,8 +78,8 @@ def judge(work, applied, folder, image, scenario):
     shutil.copytree(PORT, folder)
     for place in (APPLICATION, SERVER):
         shutil.copytree(place, folder, dirs_exist_ok=True)
-    home = next(place for place in (PORT, APPLICATION, SERVER) if (ROOT / applied.file).is_relative_to(place))
-    (folder / (ROOT / applied.file).relative_to(home)).write_text(applied.text)
+    base = next(place for place in (PORT, APPLICATION, SERVER) if (ROOT / applied.file).is_relative_to(place))
+    (folder / (ROOT / applied.file).relative_to(base)).write_text(applied.text)
     flags = [
         "arm-none-eabi-gcc",
         f"-mcpu={CPUS[family]}",

@@ -37,7 +37,7 @@ static inline void fuzz_require(bool holds, const char *what) {
 }
 
 /// Prints the result of the input if IWHEEL_FUZZ_TELL is set: test/fuzz/run checks with it that a seed is accepted.
-static inline void fuzz_tell(const char *what) {
+static inline void fuzz_position(const char *what) {
     static int prints = -1;
     if (prints < 0) {
         prints = (getenv("IWHEEL_FUZZ_TELL") != NULL) ? 1 : 0;

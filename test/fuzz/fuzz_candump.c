@@ -30,11 +30,11 @@ static void judge_line(const char *line, size_t length) {
     memcpy(copy, line, length);
     switch (candump_parse(copy, length, &frame, &why)) {
     case CANDUMP_FRAME:
-        fuzz_tell("accepted");
+        fuzz_position("accepted");
         judge_frame(&frame);
         break;
     case CANDUMP_BAD:
-        fuzz_tell("refused");
+        fuzz_position("refused");
         fuzz_require(why != NULL && why[0] != '\0', "a bad line has a reason");
         break;
     default:

@@ -151,7 +151,7 @@ static void judge_greeting(iwc_t *self, const uint8_t *data, size_t size) {
     feed(data, size);
     wire.closed = (size % 2U) != 0U;
     const iwc_result_t result = iwc_adopt(self, CONNECTION, 0);
-    fuzz_tell((result == IWC_OK || result == IWC_NEWER || result == IWC_REFUSED) ? "accepted" : "refused");
+    fuzz_position((result == IWC_OK || result == IWC_NEWER || result == IWC_REFUSED) ? "accepted" : "refused");
     fuzz_require((result == IWC_OK || result == IWC_NEWER) || self->fd < 0, "no connection without a greeting");
     fuzz_require(result != IWC_REFUSED || strlen(iwc_reason(self)) < sizeof self->reason, "a refusal's words end");
     iwc_close(self);
@@ -186,9 +186,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         result = read_some(self, how);
     }
     result = read_some(self, 0);
-    fuzz_tell((result == IWC_TIMEOUT && self->begin == self->whole && self->whole == self->end && size > 1U)
-                  ? "accepted"
-                  : "refused");
+    fuzz_position((result == IWC_TIMEOUT && self->begin == self->whole && self->whole == self->end && size > 1U)
+                      ? "accepted"
+                      : "refused");
     wire.closed = true;
     result = read_some(self, 0);
     fuzz_require(result == IWC_CLOSED || result == IWC_GARBLED, "it is over");

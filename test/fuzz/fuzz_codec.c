@@ -61,10 +61,10 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         const iw_can_frame_t frame = take_frame(&bytes);
         message_t message;
         if (message_decode(&frame, &message)) {
-            fuzz_tell("accepted");
+            fuzz_position("accepted");
             judge(&frame, &message);
         } else {
-            fuzz_tell("refused");
+            fuzz_position("refused");
         }
     }
     return 0;

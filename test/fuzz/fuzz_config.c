@@ -29,7 +29,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     before = config;
     const int result = gateway_config_parse("fuzz.conf", (const char *)data, size, &config, err);
     const long length = ftell(err);
-    fuzz_tell((result == 0) ? "accepted" : "refused");
+    fuzz_position((result == 0) ? "accepted" : "refused");
     if (result == 0) {
         judge_accepted(&config, err);
     } else {

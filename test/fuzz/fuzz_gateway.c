@@ -332,6 +332,6 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         act(&world, &bytes);
     }
     calm(&world, 20);
-    fuzz_tell(world.moved ? "accepted" : "refused");
+    fuzz_position(world.moved ? "accepted" : "refused");
     return 0;
 }

@@ -25,7 +25,7 @@ static void judge_quote(const iwn_line_t *line) {
     iwn_quote_t quote;
     memcpy(copy, line->json, length);
     if (iwn_quote_take(&json, &length, &quote)) {
-        fuzz_tell("quoted");
+        fuzz_position("quoted");
         fuzz_require(json > copy && length < line->length && json + length == copy + line->length, "a rest");
         const size_t whole = iwn_quote_write(&quote, json, length, again, sizeof again);
         fuzz_require(whole == line->length && memcmp(again, line->json, whole) == 0, "the same quote");
@@ -35,7 +35,7 @@ static void judge_quote(const iwn_line_t *line) {
 static void judge(iwn_receiver_t *receiver, char byte, bool stamped) {
     iwn_line_t line;
     if (iwn_receiver_put(receiver, byte, &line) == IWN_LINE_GOOD) {
-        fuzz_tell("accepted");
+        fuzz_position("accepted");
         judge_line(&line, stamped);
         judge_quote(&line);
     }

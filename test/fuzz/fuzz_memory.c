@@ -38,7 +38,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     memset(&known, 0xA5, sizeof known);
     before = known;
     if (gw_assumptions_file_read(text, size, BUS, &known, reason)) {
-        fuzz_tell("accepted");
+        fuzz_position("accepted");
         for (unsigned item = 0; item < IW_ASSUMPTION_ITEMS; item++) {
             fuzz_require(known.item[item].entry.state == IW_ASSUMED ||
                              gw_bounds_item((iw_assumption_item_t)item, &known.item[item]),
@@ -54,7 +54,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
                      "the written file can be read");
         fuzz_require(memcmp(&before, &known, sizeof known) == 0, "and has the same values");
     } else {
-        fuzz_tell("refused");
+        fuzz_position("refused");
         fuzz_require(memchr(reason, '\0', sizeof reason) != NULL && reason[0] != '\0', "a refusal has a reason");
         fuzz_require(memcmp(&before, &known, sizeof known) == 0, "and changes nothing");
     }

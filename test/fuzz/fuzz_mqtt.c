@@ -78,7 +78,7 @@ static void judge_command(const mqtt_rules_t *rules, const mqtt_command_t *comma
     mqtt_judge(&judge, rules, command, NOW_US, &order);
     fuzz_require(judge.counts[order.verdict] == 1U, "counted");
     fuzz_require((order.verdict == MQTT_TAKEN) == (order.request[0] != '\0'), "a request, or a reason");
-    fuzz_tell((order.verdict == MQTT_TAKEN) ? "accepted" : "refused");
+    fuzz_position((order.verdict == MQTT_TAKEN) ? "accepted" : "refused");
     if (order.verdict != MQTT_TAKEN) {
         fuzz_require(order.why[0] != '\0', "and why");
         return;
@@ -99,7 +99,7 @@ static void judge_command(const mqtt_rules_t *rules, const mqtt_command_t *comma
 /// The first line is the verb; after a tab the response topic; after another tab correlation data. Flags may precede the verb: `!` the message
 /// is retained; `#` sixteen other senders were active just now; `-` the bridge only watches; `+` the bridge may reset.
 static void judge(const uint8_t *data, size_t size) {
-    mqtt_rules_t rules = {"0123456789abcdef", 300, true, false, "iwheel/w1/reply/"};
+    mqtt_rules_t rules = {"0123456789abcdef", 300, true, false, "iwheel/w1/reply/", 0};
     mqtt_command_t command = {0};
     char first[160] = "";
     const uint8_t *newline = memchr(data, '\n', size);
@@ -156,7 +156,7 @@ static void read_file(const uint8_t *data, size_t size) {
         found++;
     }
     fuzz_require(found == spool.waiting, "as many as it reports");
-    fuzz_tell((found > 0U) ? "accepted" : "refused");
+    fuzz_position((found > 0U) ? "accepted" : "refused");
     fuzz_require(mqtt_spool_add(&spool, "stop", "{}", 2, 0), "it goes on");
     fuzz_require(mqtt_spool_after(&spool, number, &event) && strcmp(event.name, "stop") == 0, "in order");
     const uint64_t added = event.number;

@@ -35,6 +35,12 @@ static void compare_ids(const iwn_id_t *now, const iwn_id_t *before) {
     fuzz_require(now->kind != IWN_ID_TEXT || strcmp(now->text, before->text) == 0, "the id is the same text");
 }
 
+/// The new reader writes spaces for the bytes of a character that fits only in part; the earlier one omits it.
+static bool same_reason(const char *now, const char *before) {
+    const size_t length = strlen(before);
+    return strncmp(now, before, length) == 0 && strspn(&now[length], " ") == strlen(&now[length]);
+}
+
 static void compare_requests(const iwn_request_t *now, const iwn_request_t *before) {
     fuzz_require(now->cmd == before->cmd, "the same command");
     fuzz_require(now->left_mm_s == before->left_mm_s && now->right_mm_s == before->right_mm_s &&
@@ -49,7 +55,7 @@ static void compare_requests(const iwn_request_t *now, const iwn_request_t *befo
     fuzz_require(now->has_t_us == before->has_t_us && now->t_us == before->t_us && now->has_stop == before->has_stop &&
                      now->stop == before->stop,
                  "the same time, the same stop");
-    fuzz_require(strcmp(now->name, before->name) == 0 && strcmp(now->reason, before->reason) == 0 &&
+    fuzz_require(strcmp(now->name, before->name) == 0 && same_reason(now->reason, before->reason) &&
                      strcmp(now->value, before->value) == 0 && strcmp(now->how, before->how) == 0 &&
                      strcmp(now->file, before->file) == 0 && strcmp(now->key, before->key) == 0 &&
                      strcmp(now->lease_key, before->lease_key) == 0 && now->offset == before->offset &&
@@ -91,10 +97,10 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     memset(&refusal, 0xA5, sizeof refusal);
     const bool accepted = iwn_request_read(line, size, &work, &request, &refusal);
     if (accepted) {
-        fuzz_tell("accepted");
+        fuzz_position("accepted");
         judge_request(&request);
     } else {
-        fuzz_tell("refused");
+        fuzz_position("refused");
         judge_refusal(&refusal);
     }
     fuzz_require(request.id.kind <= IWN_ID_TEXT, "the id has a known kind");

@@ -114,7 +114,7 @@ static void pass(uint32_t span_ms) {
             send_text("{\"cmd\":\"alive\"}"); // Otherwise the board closes all channels after 500 ms.
         }
         gateway_rig_step(&rig);
-        const iw_snapshot_t seen = gateway_rig_look(&rig);
+        const iw_snapshot_t seen = gateway_rig_snapshot(&rig);
         (void)brd_host_report(&host, &seen, false);
         rig.judge.violation = NULL; // The judge does not know the requests of this target.
         gateway_rig_run(&rig, 5000);
@@ -202,6 +202,6 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     }
     pass(100);
     fuzz_require(answers <= asked, "a request is answered once");
-    fuzz_tell((moved > 0U) ? "accepted" : "refused");
+    fuzz_position((moved > 0U) ? "accepted" : "refused");
     return 0;
 }

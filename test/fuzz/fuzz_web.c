@@ -55,11 +55,11 @@ static void judge_request(char *fields[FIELDS], bool drives) {
                  "a refusal has a reason");
     if (verdict.status != 200U) {
         if (drives) {
-            fuzz_tell("refused");
+            fuzz_position("refused");
         }
         return;
     }
-    fuzz_tell("accepted");
+    fuzz_position("accepted");
     fuzz_require(asked.host != NULL && asked.host[0] != '\0', "without a host no route");
     fuzz_require(verdict.route->verb == WEB_FILE || verdict.route->verb == WEB_CHALLENGE ||
                      verdict.route->verb == WEB_STOP || proof == WEB_PROOF_FULL ||
@@ -76,10 +76,10 @@ static void judge_drive(char *fields[FIELDS]) {
     web_twist_t twist = {0, 0};
     const web_command_t command = {fields[6] != NULL && strcmp(fields[6], token) == 0, fields[7], fields[8], fields[9],
                                    fields[10]};
-    const web_limits_t limits = {300, 300000};
+    const web_limits_t limits = {300, 300000, 0};
     web_driver_begin(&driver, 0);
     if (web_driver_take(&driver, &command, &limits, 10000000U, &twist) == NULL) {
-        fuzz_tell("accepted");
+        fuzz_position("accepted");
         fuzz_require(twist.v_mm_s >= -300 && twist.v_mm_s <= 300 && twist.yaw_mrad_s >= -1000 &&
                          twist.yaw_mrad_s <= 1000,
                      "within the limits");
@@ -87,7 +87,7 @@ static void judge_drive(char *fields[FIELDS]) {
         fuzz_require(web_driver_take(&driver, &command, &limits, 10000000U, &twist) != NULL, "once");
     } else {
         fuzz_require(driver.dropped == 1U, "counted");
-        fuzz_tell("refused");
+        fuzz_position("refused");
     }
 }
 
@@ -98,7 +98,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     judge_request(fields, true);
     judge_drive(fields);
     if (web_recording_name(fields[11])) {
-        fuzz_tell("accepted");
+        fuzz_position("accepted");
         fuzz_require(strlen(fields[11]) < WEB_NAME_SIZE && strpbrk(fields[11], "/\\\"% ") == NULL &&
                          fields[11][0] != '.' && strstr(fields[11], "..") == NULL,
                      "a bare name");

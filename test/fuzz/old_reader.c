@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: MIT
-// The gateway's reader of requests until version 0.1, on jansson, with the requests that were added later: the new reader must return the same
-// results. For tests only.
+// The gateway's reader of requests until version 0.1, on jansson, with the requests that were added later, and with stops that nothing in the object
+// makes invalid: the new reader must return the same results. For tests only.
 #include "old_reader.h"
 
 #include "iwheel_northbound/text.h"
-#include "request_fields.h"
 
 #include <inttypes.h>
 #include <jansson.h>
@@ -92,8 +91,8 @@ static const field_t fields[] = {
 #define FIELDS (sizeof fields / sizeof fields[0])
 
 // The names are those of the description: test/northbound and the unit tests judge them.
-#define NAME(name) #name,
-#define WORD(name) " " #name
+#define NAME(cmd, name) #name,
+#define WORD(cmd, name) " " #name
 static const char *const cmd_names[IWN_CMDS] = {IWN_REQUEST_NAMES(NAME)};
 
 __attribute__((format(printf, 3, 4))) static bool refuse(iwn_refusal_t *out_refusal, iwn_error_t error,
@@ -292,8 +291,30 @@ static const field_t *find_field(const char *name, iwn_cmd_t cmd) {
     return NULL;
 }
 
+static bool is_stop(const iwn_request_t *request) {
+    return request->cmd == IWN_CMD_STOP || request->cmd == IWN_CMD_DISARM || request->cmd == IWN_CMD_ESTOP;
+}
+
+/// Reads the part of a text that can be used: the characters that fit, and spaces for the others.
+static void read_usable(const char *text, char *target, size_t max) {
+    size_t bytes;
+    for (size_t length = 0; text != NULL && *text != '\0'; length += bytes, text += bytes) {
+        const bool plain = iwn_plain_is(iwn_plain_read(text, &bytes));
+        if (length + bytes > max) {
+            return;
+        }
+        memset(&target[length], ' ', bytes);
+        memcpy(&target[length], text, plain ? bytes : 0U);
+    }
+}
+
 /// Judges every field of the request: known and valid.
 static bool read_fields(json_t *root, iwn_request_t *request, iwn_refusal_t *out_refusal) {
+    if (is_stop(request)) {
+        const json_t *reason = (request->cmd == IWN_CMD_ESTOP) ? json_object_get(root, "reason") : NULL;
+        read_usable(json_string_value(reason), request->reason, IWN_REASON_MAX);
+        return true;
+    }
     for (void *it = json_object_iter(root); it != NULL; it = json_object_iter_next(root, it)) {
         const char *name = json_object_iter_key(it);
         if (strcmp(name, "id") == 0 || strcmp(name, "cmd") == 0) {
@@ -346,8 +367,10 @@ bool old_request_read(const char *line, size_t length, iwn_request_t *out_reques
         const char *reason = (root == NULL) ? error.text : "it is not an object";
         return refuse(out_refusal, IWN_BAD_JSON, "not one JSON object on one line: %s", quotable(reason, "unreadable"));
     }
-    if (!read_id(root, &out_request->id, out_refusal) || !read_cmd(root, &out_request->cmd, out_refusal) ||
-        !read_fields(root, out_request, out_refusal) || !is_complete(root, out_request, out_refusal)) {
+    const bool known = read_cmd(root, &out_request->cmd, out_refusal);
+    const bool good = read_id(root, &out_request->id, out_refusal);
+    if (!known || !(good || is_stop(out_request)) || !read_fields(root, out_request, out_refusal) ||
+        !is_complete(root, out_request, out_refusal)) {
         return false;
     }
     out_request->has_current = json_object_get(root, "left_mA") != NULL;

@@ -84,9 +84,9 @@ def by_hand():
             *mqtt_odd(),
         ],
         "memory": [checked(b'{"format":"iwheel-ledger"}\n')]
-        + [ledger(item, b"") for item in memory_items()]
+        + [store(item, b"") for item in memory_items()]
         + [
-            ledger(b"", b'"%s":{"from":"%s","unit":"dN","offset_mN":%d,"drift_mN":%d,"deviation_mN":%d,"samples":%d,"wall_us":5}' % row)
+            store(b"", b'"%s":{"from":"%s","unit":"dN","offset_mN":%d,"drift_mN":%d,"deviation_mN":%d,"samples":%d,"wall_us":5}' % row)
             for row in (
                 (b"left", b"estimated", 150, -900, 900, 40),
                 (b"right", b"operator", -1200, 0, 0, 40),
@@ -254,10 +254,10 @@ def memory():
     )
     offset = b'"left":{"from":"wheel","unit":"cN","offset_mN":1200,"drift_mN":0,"deviation_mN":0,"samples":0,"wall_us":1760000000000000}'
     texts = [(item, b"") for item in items] + [(b",".join(items[1:]), offset)]
-    return [ledger(*text) for text in texts]
+    return [store(*text) for text in texts]
 
 
-def ledger(items, offsets):
+def store(items, offsets):
     return checked(b'{"format":"iwheel-ledger","version":1,"bus":"can0","items":{%s},"offsets":{%s}}\n' % (items, offsets))
 
 

@@ -156,9 +156,9 @@ def deviations(folder, fault):
 
 def northbound(folder, fault):
     """The description of the protocol and the files that must agree with it, with one change: file, old text, new text."""
-    library = [f"include/iwheel_northbound/{name}.h" for name in ("json_in", "request", "words")]
+    library = [f"include/iwheel_northbound/{name}.h" for name in ("json_in", "request", "request_fields", "words")]
     sources = [
-        *(f"lib/northbound/protocol/{name}" for name in ("src/words.c", "src/states.c", "src/request_fields.h", *library)),
+        *(f"lib/northbound/protocol/{name}" for name in ("src/words.c", "src/states.c", *library)),
         "lib/northbound/server/src/observe.c",
         *(f"app/gateway/{name}.c" for name in ("answers/answers_events", "bus/bus_facts", "assumptions/assumptions_json")),
     ]
@@ -366,6 +366,15 @@ def python_pins(folder, fault):
     return run(ROOT / ".venv/bin/python", SCRIPTS / "house.py", "pins", folder)
 
 
+def python_wheels_there(folder, lines):
+    """The same in an environment that exists, with the pip of .venv: to install pip takes six times as long as all else."""
+    run(sys.executable, "-m", "venv", "--without-pip", folder / "venv")
+    pip = folder / "venv/bin/pip"
+    pip.write_text(f'#!/bin/sh\nexec "{ROOT}/.venv/bin/python" -m pip --python "{folder}/venv/bin/python" "$@"\n')
+    pip.chmod(0o755)
+    return python_wheels(folder, lines)
+
+
 def python_wheels(folder, lines):
     """Two pinned wheels: only the one with its checksum may be installed."""
     sums = {}
@@ -402,6 +411,11 @@ def sizes_of_use(_, more):
     module.CPUS = {"Cortex-M4": "cortex-m4"}
     module.USES = {"codec": ("codec.h observation.h", f"{module.CODEC} {more}", 10_000)}
     found = module.uses([build])[1]
+    return len(found), "\n".join(found)
+
+
+def sizes_of_image(_, used):
+    found = [*of_script("sizes").crowded({"STM32F103 gateway": used, "gateway": [60000]})]
     return len(found), "\n".join(found)
 
 
@@ -554,14 +568,14 @@ CASES = [
         northbound,
         "python3",
         "a field that the reader does not know",
-        ("lib/northbound/protocol/src/request_fields.h", "    ROW(reason, reason, TEXT, 200, false, BIT(ESTOP))", "    "),
+        ("lib/northbound/protocol/include/iwheel_northbound/request_fields.h", "    ROW(reason, reason, TEXT, 200, false, BIT(ESTOP))", "    "),
         True,
     ),
     (
         northbound,
         "python3",
-        "a request at another position",
-        ("lib/northbound/protocol/include/iwheel_northbound/request.h", "IWN_CMD_TARE,\n    IWN_CMD_WHY,", "IWN_CMD_WHY,\n    IWN_CMD_TARE,"),
+        "a request with the name of another",
+        ("lib/northbound/protocol/include/iwheel_northbound/request_fields.h", "NAME(TARE, tare)", "NAME(WHY, tare)"),
         True,
     ),
     (
@@ -614,6 +628,8 @@ CASES = [
     (style, "lizard", "401 lines that are no comments", CLEAN + "\n" * 396, True),
     (style, "lizard", "no licence line", CLEAN.split("\n", 1)[1], True),
     (style, "lizard", "unfinished", CLEAN + "// " + "TO" + "DO\n", True),
+    (style, "lizard", "a name with a replaced word", CLEAN + "int iw_told_mA;\n", True),
+    (style, "lizard", "a replaced word inside a longer one", CLEAN + "int iw_ftell_mA;\n", False),
     (style, "lizard", "the form of the tree", function("    a++;\n    return (a > 1) ? a : 0;\n"), False),
     (style, "lizard", "++ before a name", function("    ++a;\n    return a;\n"), True),
     (style, "lizard", "a comparison that chooses", function("    return a > 1 ? a : 0;\n"), True),
@@ -753,12 +769,16 @@ CASES = [
     (python_pins, "python3", "an unused pin", ("requirements/pyproject.toml", r'^    "lizard==.*$', ""), True),
     (python_pins, "python3", "a program that calls pip without checksums", ("tool", "--require-hashes ", ""), True),
     (python_wheels, "python3", "clean", "one==1 --hash=sha256:{one}\ntwo==1 --hash=sha256:{two}\n", False),
-    (python_wheels, "python3", "a wheel with another checksum", "one==1 --hash=sha256:{one}\ntwo==1 --hash=sha256:{other}\n", True),
-    (python_wheels, "python3", "a wheel without checksum", "one==1 --hash=sha256:{one}\ntwo==1\n", True),
-    (python_wheels, "python3", "a wheel that does not fit this Python", "one==1 --hash=sha256:{one}\ntwo==2 --hash=sha256:{two}\n", True),
+    (python_wheels_there, "python3", "clean", "one==1 --hash=sha256:{one}\ntwo==1 --hash=sha256:{two}\n", False),
+    (python_wheels_there, "python3", "a wheel with another checksum", "one==1 --hash=sha256:{one}\ntwo==1 --hash=sha256:{other}\n", True),
+    (python_wheels_there, "python3", "a wheel without checksum", "one==1 --hash=sha256:{one}\ntwo==1\n", True),
+    (python_wheels_there, "python3", "a wheel that does not fit this Python", "one==1 --hash=sha256:{one}\ntwo==2 --hash=sha256:{two}\n", True),
     (sizes, "python3", "clean", {"permit": [2039], "core": [9100]}, False),
     (sizes, "python3", "3 % larger", {"permit": [2060], "core": [9060]}, True),
     (sizes, "python3", "a module more", {"permit": [2000], "core": [9000], "new": [1]}, True),
+    (sizes_of_image, "python3", "clean", [60488, 17688, 1584], False),
+    (sizes_of_image, "python3", "too little flash free", [60489, 17688, 1584], True),
+    (sizes_of_image, "python3", "too little RAM free", [60488, 17689, 1584], True),
     (sizes_of_use, "arm-none-eabi-gcc", "clean", "", False),
     (sizes_of_use, "arm-none-eabi-gcc", "a module that nothing calls", "iw_observation_init", True),
     (mutation, "clang", "seen", "killed", False),

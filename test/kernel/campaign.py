@@ -173,9 +173,9 @@ class Campaign:
         for text, kind, *_ in result["failures"]:
             print(f"       {kind}: " + text.replace("\n", "\n       | "), flush=True)
         for path in result["logs"]:
-            self.tell_log(path)
+            self.report_log(path)
 
-    def tell_log(self, path):
+    def report_log(self, path):
         """The end of a log of a failed test; of a bus log only the last frames that the gateway sent."""
         with open(path, encoding="utf-8", errors="replace") as file:
             lines = file.read().splitlines()

@@ -53,7 +53,7 @@ class FakeSlcan(threading.Thread):
         self.wake_read, self.wake_write = os.pipe()
         os.set_blocking(self.wake_read, False)
         self.lock = threading.RLock()
-        self.pending, self.waiting, self.taken = b"", 0, []
+        self.pending, self.waiting, self.received = b"", 0, []
         self.stalled = self.quit = self.open = False
         self.commands = []
         self.plug()
@@ -93,7 +93,7 @@ class FakeSlcan(threading.Thread):
         self.stalled = on
         self._wake()
 
-    def tell(self, state):
+    def report(self, state):
         """Reports the state of its controller, one of STATES."""
         self.write(STATES[state])
 
@@ -160,7 +160,7 @@ class FakeSlcan(threading.Thread):
                 self._close_channel()
             self.write(b"\r")
             return
-        self.taken.append(frame)
+        self.received.append(frame)
         if self.hub:
             self.hub.send(FRAME.pack(frame[0], frame[1], 0, 0, frame[2].ljust(8, b"\0")))
             self.waiting += 1

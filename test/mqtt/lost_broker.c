@@ -57,7 +57,7 @@ static void broker_is_lost(void) {
 }
 
 static iw_cause_t cause_of_the_stop(void) {
-    return gw_wheels_look(&daemon_rig.daemon->wheels).stop->cause;
+    return gw_wheels_snapshot(&daemon_rig.daemon->wheels).stop->cause;
 }
 
 void setUp(void) {
@@ -102,7 +102,7 @@ static void test_broker_lost_and_back_drives_nothing_without_arm(void) {
     pass(50);
     drive(300);
     pass(2000);
-    TEST_ASSERT_TRUE(daemon_rig_is_told_zero());
+    TEST_ASSERT_TRUE(daemon_rig_commands_zero());
     TEST_ASSERT_NOT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
 }
 
@@ -120,7 +120,7 @@ static void test_sender_that_stopped_drives_nothing_without_arm(void) {
     command("drive", fields); // This command comes before the gateway can reply.
     TEST_ASSERT_NULL(bridge_lease_key(&bridge.lease));
     pass(2000);
-    TEST_ASSERT_TRUE(daemon_rig_is_told_zero());
+    TEST_ASSERT_TRUE(daemon_rig_commands_zero());
 }
 
 static void test_sender_has_no_lease_after_the_gateway_restarted(void) {
@@ -133,7 +133,7 @@ static void test_sender_has_no_lease_after_the_gateway_restarted(void) {
     drive(100);
     TEST_ASSERT_NULL(bridge_lease_key(&bridge.lease));
     TEST_ASSERT_NOT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
-    TEST_ASSERT_TRUE(daemon_rig_is_told_zero());
+    TEST_ASSERT_TRUE(daemon_rig_commands_zero());
 }
 
 int main(void) {

@@ -37,12 +37,12 @@ static void note(const struct mosquitto_message *message) {
     stamp_t stamp = {.at_us = (uint64_t)now.tv_sec * 1000000U + (uint64_t)now.tv_nsec / 1000U,
                      .boot = number_behind(message, "\"boot\":\"", 16),
                      .bytes = (uint32_t)(strlen(message->topic) + (size_t)message->payloadlen)};
-    const uint64_t told_us = number_behind(message, "\"t_us\":", 10);
+    const uint64_t stamp_us = number_behind(message, "\"t_us\":", 10);
     const char *id = memmem(message->payload, (size_t)message->payloadlen, "\"id\":\"", 6);
-    if (told_us == 0U) {
+    if (stamp_us == 0U) {
         return;
     }
-    stamp.late_us = (uint32_t)(stamp.at_us - told_us);
+    stamp.late_us = (uint32_t)(stamp.at_us - stamp_us);
     stamp.number =
         (id != NULL && strstr(message->topic, "/event/") != NULL) ? (uint32_t)strtoul(id + 6 + 17, NULL, 10) : 0U;
     if (file == NULL) {

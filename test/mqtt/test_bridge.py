@@ -16,6 +16,7 @@ import pytest
 from bus import now_us
 from harness import read_only
 from mqtt_rig import ID
+from shifted_clock import ShiftedClock
 from trials import ROOT, Driver, Skip, braking_ms, until
 from verdict import hold
 
@@ -59,6 +60,21 @@ def arm(far):
     """Arms and stores the key; a busy machine may need a second try."""
     far.key = until(lambda: (reply := far.ask("arm"))["ok"] and reply, what="armed")["key"]
     return far.key
+
+
+@pytest.mark.rig(driving=True)
+def test_gateway_with_a_clock_of_its_own_is_stopped_and_armed(rig):
+    rig.start_gateway()
+    rig.start_broker()
+    rig.mqtt_settings["gateway"]["socket"] = rig.path("board.sock")
+    ShiftedClock(rig.path("board.sock"), rig.path("gateway.sock"), 3_600_000_000)
+    rig.start_bridge()
+    far = rig.online()
+    count = len(far.messages("state"))
+    state = until(lambda: (states := far.messages("state"))[count:] and states[-1], what="a new state")
+    assert state["t_us"] > now_us() + 3_000_000_000
+    assert far.ask("stop", quote={key: state[key] for key in ("boot", "t_us")})["ok"]
+    arm(far)
 
 
 def steer(far, seconds, speed=200, until_time=None):
@@ -162,10 +178,13 @@ def test_home_assistant_gets_sensors_that_are_in_the_state(rig):
         measured = config.get("unit_of_measurement") is not None
         assert (config.get("state_class") in ("measurement", "total")) == measured, f"a number has statistics, a text has none: {config}"
     assert len({config["unique_id"] for _, config, _ in reply}) == 10
-    (template,) = [config["value_template"] for topic, config, _ in reply if topic.endswith("/estop/config")]
-    jinja = pytest.importorskip("jinja2").Template(template)
-    for line, shown in (("released", "OFF"), ("pressed", "ON"), ("unreadable", "ON"), ("disagrees", "ON"), ("none", "None")):
-        assert jinja.render(value_json={"estop": {"state": line}}) == shown, f"{line}: Home Assistant shows None as unknown"
+    lines = {"released": "OFF", "pressed": "ON", "unreadable": "ON", "disagrees": "ON", "none": "None"}
+    buses = {"active": "OFF", "passive": "OFF", "bus_off": "ON", "down": "ON"}
+    for sensor, states in (("estop", lines), ("bus", buses)):
+        (template,) = [config["value_template"] for topic, config, _ in reply if topic.endswith(f"/{sensor}/config")]
+        jinja = pytest.importorskip("jinja2").Template(template)
+        for value, shown in states.items():
+            assert jinja.render(value_json={sensor: {"state": value}}) == shown, f"{value}: Home Assistant shows None as unknown"
     assert rig.far("later", topics=("homeassistant/#",)) and until(
         lambda: len(rig.fars[-1].all) == 10 and all(retain for _, _, retain, _ in rig.fars[-1].all), what="retained"
     )
@@ -259,16 +278,16 @@ def test_garbage_is_dropped_counted_and_changes_nothing(rig):
         json.dumps({**good, "t_us": 1.5}).encode(),
         json.dumps({**good, "t_us": -1}).encode(),
         json.dumps({**good, "ttl_ms": 1001}).encode(),
-        json.dumps({**good, "speed": 1}).encode(),
         json.dumps({**good, "boot": None}).encode(),
     ]
     for payload in garbage:
         far.client.publish(f"iwheel/{ID}/cmd/stop", payload, qos=1)
     far.client.publish(f"iwheel/{ID}/cmd/self-destruct", json.dumps(good), qos=1)
-    far.client.publish(f"iwheel/{ID}/cmd/estop", json.dumps({**good, "reason": ['x\n{"cmd":"reset"}']}), qos=1)
+    far.client.publish(f"iwheel/{ID}/cmd/why", json.dumps({**good, "speed": 1}), qos=1)  # A stop may have any field.
     until(lambda: counts(far)["garbled"] == len(garbage) + 2, what=f"{len(garbage) + 2} counted: {counts(far)}")
     assert rig.gateway_state()["state"] == "listening" and rig.client(name="a").request("why")["number"] == 0
     assert far.ask("why")["ok"]
+    assert far.ask("estop", reason=['x\n{"cmd":"reset"}'], speed=1)["state"] == "latched"
 
 
 def test_bridge_that_watches_neither_arms_drives_nor_resets(rig):
@@ -641,7 +660,11 @@ def test_credentials_wrong_or_readable_by_others_are_refused(rig):
     rig.mqtt_settings["broker"]["credentials"] = str(secret)
     rig.start_gateway()
     rig.start_broker()
-    for text, mode, code, words in (("w1:pass:word\n", 0o644, 77, "others may read"), ("nothing\n", 0o600, 78, "USER:PASSWORD"), (None, 0, 77, "No such file")):
+    for text, mode, code, words in (
+        ("w1:pass:word\n", 0o644, 77, "other users may read"),
+        ("nothing\n", 0o600, 78, "USER:PASSWORD"),
+        (None, 0, 77, "No such file"),
+    ):
         secret.unlink(missing_ok=True)
         if text:
             secret.write_text(text, encoding="ascii")

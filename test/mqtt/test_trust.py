@@ -312,8 +312,8 @@ def test_home_assistant_sensors_pass_shipped_mosquitto_rights(rig):
     use_tls(rig, "localhost", port)
     rig.start_gateway()
     rig.start_bridge()
-    home = fleet_far(rig, port, "homeassistant", topics=("homeassistant/#", "iwheel/+/availability"))
-    until(lambda: len([1 for topic, *_ in home.all if topic.startswith("homeassistant/")]) == 10, 15, rig.words())
+    sensors = fleet_far(rig, port, "homeassistant", topics=("homeassistant/#", "iwheel/+/availability"))
+    until(lambda: len([1 for topic, *_ in sensors.all if topic.startswith("homeassistant/")]) == 10, 15, rig.words())
     console_far = fleet_far(rig, port, "console")
     until(
         lambda: console_far.messages("info")[-1:] and console_far.messages("info")[-1].get("home_assistant") == {"sensors": 10, "passed_on": 10},
@@ -324,7 +324,7 @@ def test_home_assistant_sensors_pass_shipped_mosquitto_rights(rig):
     second = fleet_far(rig, port, "w2")
     second.client.publish("homeassistant/sensor/iwheel_w1/forged/config", "{}", qos=1).wait_for_publish(3)
     time.sleep(0.5)
-    assert not [topic for topic, *_ in home.all if "forged" in topic]
+    assert not [topic for topic, *_ in sensors.all if "forged" in topic]
 
 
 @pytest.mark.rig(settings={"home_assistant": {"enabled": "yes"}})

@@ -174,8 +174,8 @@ class Document:
 
     def words_in_place(self, kind):
         """Words without a separate table."""
-        told_elsewhere = ("cause", "error", "provenance", "force_validity", "side")
-        return set(self.description.words[kind]) if kind in self.description.words and kind not in told_elsewhere else set()
+        described_elsewhere = ("cause", "error", "provenance", "force_validity", "side")
+        return set(self.description.words[kind]) if kind in self.description.words and kind not in described_elsewhere else set()
 
     def snapshot(self):
         text = section(self.text, "## The snapshot")
@@ -244,10 +244,9 @@ def c_limits(description):
         found = re.search(rf"^#define {name} +(\d+)U?(?: +//.*)?$", read(header), re.MULTILINE)
         if found is None or int(found[1]) != number:
             yield f"{header}: {name} is {found and found[1]}, in share/northbound.json {number}"
-    for header, prefix, words in (("request", "CMD", description.requests), ("words", "TOPIC", description.words["topic"])):
-        found = [name.lower() for name in re.findall(rf"^    IWN_{prefix}_(\w+)", read(path.format(header)), re.MULTILINE)]
-        if found != list(words):
-            yield f"{path.format(header)}: IWN_{prefix}_... are {found}, in share/northbound.json {list(words)}"
+    topics = [name.lower() for name in re.findall(r"^    IWN_TOPIC_(\w+)", read(path.format("words")), re.MULTILINE)]
+    if topics != list(description.words["topic"]):
+        yield f"{path.format('words')}: IWN_TOPIC_... are {topics}, in share/northbound.json {list(description.words['topic'])}"
 
 
 class TestDescription(unittest.TestCase):

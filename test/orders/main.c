@@ -150,7 +150,7 @@ static unsigned shrink(world_t *world, const combination_t *combination, uint8_t
     return count;
 }
 
-static void tell_failure(play_t *play, unsigned count) {
+static void print_failure(play_t *play, unsigned count) {
     const combination_t *const combination = play->combination;
     world_t *const world = play->world;
     printf("FAILED rule %u: %s\n", world->oracle.rule, world->oracle.text);
@@ -184,7 +184,7 @@ static bool play_combination(const combination_t *combination, uint64_t *out_seq
     begin(&world, combination, &stats);
     const bool good = !world_broken(&world) && play_all(&play, &count);
     if (!good) {
-        tell_failure(&play, count);
+        print_failure(&play, count);
     }
     const bool seen = happened(&stats, combination);
     printf("%-6s from %s, %s, spacing %u: %llu sequences, %llu frames of which %llu nonzero, %llu times armed, "

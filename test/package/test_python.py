@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.exact
 ROOT = Path(__file__).resolve().parents[2]
 VERSIONS = [(3, minor) for minor in range(10, 15)]
 

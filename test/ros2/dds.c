@@ -4,13 +4,17 @@
 #include "free_domain.h"
 #include "raw.h"
 #include "ros.h"
+#include "ros_types.h"
 
 #include "unity.h"
 
 #include <stdlib.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 static ros_settings_t settings;
 static ros_t *ros;
+static uint64_t set_us; ///< The time of the bridge; 0: the real one.
 
 void setUp(void) {
     static uint32_t domain;
@@ -25,6 +29,7 @@ void tearDown(void) {
         ros_close(ros);
     }
     ros = NULL;
+    set_us = 0;
 }
 
 static void test_dds_node_on_loopback_is_not_reached_from_outside(void) {
@@ -165,13 +170,161 @@ static void test_dds_replies_to_callers_without_reader_are_sent_later(void) {
     (void)dds_delete(peer);
 }
 
+static bool await_used(bool used) {
+    for (unsigned i = 0; i < 1000U && ros_is_used(ros) != used; i++) {
+        dds_sleepfor(DDS_MSECS(5));
+    }
+    return ros_is_used(ros) == used;
+}
+
+static void test_dds_node_is_used_by_a_reader_or_a_caller_only(void) {
+    (void)client_of("stop");
+    TEST_ASSERT_TRUE(await_used(true));
+    (void)dds_delete(peer);
+    TEST_ASSERT_TRUE(await_used(false));
+    peer = dds_create_participant(settings.ros.domain, NULL, NULL);
+    const dds_entity_t names =
+        ros_raw_topic(peer, "ros_discovery_info", "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_");
+    TEST_ASSERT_GREATER_THAN_INT32(0, dds_create_reader(peer, names, NULL, NULL));
+    dds_sleepfor(DDS_MSECS(300));
+    TEST_ASSERT_FALSE(ros_is_used(ros));
+    const dds_entity_t odom = ros_raw_topic(peer, "rt/odom", "nav_msgs::msg::dds_::Odometry_");
+    TEST_ASSERT_GREATER_THAN_INT32(0, dds_create_reader(peer, odom, NULL, NULL));
+    TEST_ASSERT_TRUE(await_used(true));
+    (void)dds_delete(peer);
+}
+
+// ---- publishers that do not match -------------------------------------------------------------------------------------
+
+uint64_t __real_bridge_now_us(void);
+uint64_t __wrap_bridge_now_us(void);
+
+uint64_t __wrap_bridge_now_us(void) {
+    return (set_us != 0U) ? set_us : __real_bridge_now_us();
+}
+
+/// Calls the search after this time. Returns true if it searched.
+static bool searches(ros_unmatched_t *unmatched, unsigned after_ms) {
+    set_us += 1000U * (uint64_t)after_ms;
+    unmatched->wanted = NULL; // A search writes it.
+    ros_find_unmatched(ros, unmatched);
+    return unmatched->wanted != NULL;
+}
+
+/// Returns true if the searches end: DDS can repeat an announcement.
+static bool await_rest(ros_unmatched_t *unmatched) {
+    for (unsigned i = 0; i < 1000U && searches(unmatched, 3000); i++) {
+        dds_sleepfor(DDS_MSECS(5));
+    }
+    return !searches(unmatched, 100);
+}
+
+static bool await_count(ros_unmatched_t *unmatched, unsigned count) {
+    for (unsigned i = 0; i < 3000U && unmatched->count != count; i++) {
+        dds_sleepfor(DDS_MSECS(5));
+        ros_find_unmatched(ros, unmatched);
+    }
+    return unmatched->count == count;
+}
+
+/// Configuration for this machine only, as the bridge has it.
+static const char local[] =
+    "<General><Interfaces><NetworkInterface name=\"lo\" multicast=\"false\"/></Interfaces><AllowMulticast>false"
+    "</AllowMulticast></General><Discovery><ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>32"
+    "</MaxAutoParticipantIndex><Peers><Peer address=\"localhost\"/></Peers></Discovery>";
+
+#define TWIST &geometry_msgs_msg_dds__Twist__desc
+
+/// QoS of a publisher; each value is the one policy that does not match.
+typedef enum { COMMON = 0, PARTITION, OWNERSHIP, REPRESENTATION } quality_t;
+
+static dds_qos_t *quality_of(quality_t quality) {
+    static const char *partitions[] = {"other"};
+    static const dds_data_representation_id_t newer = DDS_DATA_REPRESENTATION_XCDR2;
+    dds_qos_t *qos = dds_create_qos();
+    if (quality == PARTITION) {
+        dds_qset_partition(qos, 1, partitions);
+    } else if (quality == OWNERSHIP) {
+        dds_qset_ownership(qos, DDS_OWNERSHIP_EXCLUSIVE);
+    } else if (quality == REPRESENTATION) {
+        dds_qset_data_representation(qos, 1, &newer);
+    }
+    return qos;
+}
+
+static const struct {
+    const dds_topic_descriptor_t *type;
+    quality_t quality;
+    const char *seen_type;
+    const char *seen_policy;
+} publishers[] = {{&std_msgs_msg_dds__String__desc, COMMON, "std_msgs/msg/String", ""},
+                  {TWIST, PARTITION, "geometry_msgs/msg/Twist", "partition"},
+                  {TWIST, OWNERSHIP, "geometry_msgs/msg/Twist", "ownership"},
+                  {TWIST, REPRESENTATION, "geometry_msgs/msg/Twist", "data representation"}};
+#define PUBLISHERS (sizeof publishers / sizeof publishers[0])
+
+/// Publishes on cmd_vel in a separate process: each byte of `orders` starts or ends the next publisher of the table.
+static _Noreturn void publish_unmatched(int orders) {
+    char order;
+    bool good = true;
+    (void)setenv("CYCLONEDDS_URI", local, 1);
+    for (size_t i = 0; i < PUBLISHERS; i++) {
+        if (read(orders, &order, 1) != 1) { // The test has ended.
+            _exit(1);
+        }
+        const dds_entity_t other = dds_create_participant(settings.ros.domain, NULL, NULL);
+        const dds_entity_t topic = dds_create_topic(other, publishers[i].type, "rt/cmd_vel", NULL, NULL);
+        dds_qos_t *qos = quality_of(publishers[i].quality);
+        good = dds_create_writer(other, topic, qos, NULL) > 0 && good;
+        dds_delete_qos(qos);
+        good = read(orders, &order, 1) == 1 && good;
+        (void)dds_delete(other);
+    }
+    _exit(good ? 0 : 1);
+}
+
+static void test_dds_search_of_publishers_follows_announcements(void) {
+    ros_unmatched_t unmatched = {.count = 0};
+    int orders[2];
+    int status = 1;
+    TEST_ASSERT_EQUAL_INT(0, pipe(orders));
+    const pid_t child = fork(); // Before this process has threads of DDS.
+    if (child == 0) {
+        (void)close(orders[1]);
+        publish_unmatched(orders[0]);
+    }
+    ros = ros_open(&settings, NULL, NULL, stderr);
+    TEST_ASSERT_NOT_NULL(ros);
+    set_us = __real_bridge_now_us();
+    TEST_ASSERT_TRUE(searches(&unmatched, 0));
+    TEST_ASSERT_FALSE(searches(&unmatched, 2100));
+    TEST_ASSERT_FALSE(searches(&unmatched, 7000));
+    TEST_ASSERT_TRUE(searches(&unmatched, 1000)); // 10 s after the last search.
+    for (size_t i = 0; i < PUBLISHERS; i++) {
+        TEST_ASSERT_TRUE(await_rest(&unmatched));
+        TEST_ASSERT_EQUAL_INT(1, write(orders[1], "1", 1));
+        TEST_ASSERT_TRUE_MESSAGE(await_count(&unmatched, 1), publishers[i].seen_policy);
+        TEST_ASSERT_EQUAL_STRING(publishers[i].seen_type, unmatched.type);
+        TEST_ASSERT_EQUAL_STRING(publishers[i].seen_policy, unmatched.policy);
+        TEST_ASSERT_TRUE(searches(&unmatched, 3000)); // Until it has gone.
+        TEST_ASSERT_EQUAL_INT(1, write(orders[1], "2", 1));
+        TEST_ASSERT_TRUE_MESSAGE(await_count(&unmatched, 0), publishers[i].seen_policy);
+    }
+    TEST_ASSERT_EQUAL_INT(child, waitpid(child, &status, 0));
+    TEST_ASSERT_EQUAL_INT(0, status);
+    (void)close(orders[0]);
+    (void)close(orders[1]);
+}
+
 int main(void) {
     UNITY_BEGIN();
+    RUN_TEST(test_dds_search_of_publishers_follows_announcements);
     RUN_TEST(test_dds_node_on_loopback_is_not_reached_from_outside);
     RUN_TEST(test_dds_node_on_a_network_is_reached_from_outside);
     RUN_TEST(test_dds_sample_that_cannot_be_read_is_a_request);
     RUN_TEST(test_dds_client_that_disposes_and_goes_is_no_request);
     RUN_TEST(test_dds_reply_waits_for_the_reader_of_its_caller);
     RUN_TEST(test_dds_replies_to_callers_without_reader_are_sent_later);
+    RUN_TEST(test_dds_node_is_used_by_a_reader_or_a_caller_only);
     return UNITY_END();
 }

@@ -162,7 +162,7 @@ static void arm(void) {
     tally.armed++;
 }
 
-static void assert_told_zero(void) {
+static void assert_commanded_zero(void) {
     pass(2500);
     TEST_ASSERT_EQUAL_INT16(0, daemon_rig.commanded_mm_s[IW_LEFT]);
     TEST_ASSERT_EQUAL_INT16(0, daemon_rig.commanded_mm_s[IW_RIGHT]);
@@ -181,7 +181,7 @@ static void reset(void) {
 static void press_button(void) {
     daemon_rig.estop = 1;
     tally.presses++;
-    assert_told_zero();
+    assert_commanded_zero();
     daemon_rig.estop = 0;
     pass(200);
     reset();
@@ -205,7 +205,7 @@ static void hang_gateway(void) {
 }
 
 static void change_publisher(void) {
-    assert_told_zero();
+    assert_commanded_zero();
     peer.commands = (peer.commands == peer.publishers[0]) ? peer.publishers[1] : peer.publishers[0];
     tally.publishers++;
 }
@@ -220,7 +220,7 @@ static void send_rubbish(void) {
         command(0.1, 0.1, 1000);
         pass(20);
     }
-    assert_told_zero();
+    assert_commanded_zero();
 }
 
 /// Drives for most of a minute, then makes an event happen.
@@ -231,11 +231,11 @@ static void minute(void) {
     switch (roll(8)) {
     case 0:
         ask("stop");
-        assert_told_zero();
+        assert_commanded_zero();
         break;
     case 1:
         ask("estop");
-        assert_told_zero();
+        assert_commanded_zero();
         reset();
         break;
     case 2:
@@ -255,7 +255,7 @@ static void minute(void) {
         break;
     default:
         flood(2000);
-        assert_told_zero();
+        assert_commanded_zero();
         break;
     }
     pass(1000);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The order of messages from ROS in one wake-up: the bridge's own code and the gateway's own loop in virtual time (hours_rig.h). This file
-// replaces ROS: one command and one request may wait when the bridge polls.
+// The order of messages from ROS in one wake-up: the bridge's own code and the gateway's own loop in virtual time (hours_rig.h).
 #include "bridge_parts.h"
 #include "hours_rig.h"
 
@@ -11,101 +10,7 @@
 
 #define PASS_MS 5U
 
-static bridge_t bridge;
-static ros_settings_t settings;
-static ros_command_t command;
-static bool has_command;
-static ros_request_t request;
-static bool has_request;
-static bool answered;
-static bool success;
-static int estop_shown;
-static unsigned estop_count;
-
-// ---- instead of DDS -------------------------------------------------------------------------------------------------
-
-ros_t *ros_open(const ros_settings_t *wanted, ros_came_t came, void *context, FILE *err) {
-    (void)wanted;
-    (void)came;
-    (void)context;
-    (void)err;
-    return (ros_t *)&bridge; // The bridge only compares it with NULL.
-}
-
-void ros_close(ros_t *self) {
-    (void)self;
-}
-
-void ros_woken(ros_t *self) {
-    (void)self;
-}
-
-bool ros_take_command(ros_t *self, unsigned reader, ros_command_t *out_command) {
-    const bool was = has_command && reader == 0U;
-    (void)self;
-    *out_command = command;
-    has_command = has_command && !was;
-    return was;
-}
-
-void ros_find_unmatched(ros_t *self, ros_unmatched_t *out) {
-    (void)self;
-    memset(out, 0, sizeof *out);
-}
-
-void ros_publish_estop(ros_t *self, bool pressed) {
-    (void)self;
-    estop_shown = pressed ? 1 : 0;
-    estop_count++;
-}
-
-unsigned ros_publishers(const ros_t *self) {
-    (void)self;
-    return 1;
-}
-
-bool ros_take_request(ros_t *self, ros_request_t *out_request) {
-    const bool was = has_request;
-    (void)self;
-    *out_request = request;
-    has_request = false;
-    return was;
-}
-
-void ros_answer(ros_t *self, const ros_request_t *asked, bool good, const char *text) {
-    (void)self;
-    (void)asked;
-    (void)text;
-    answered = true;
-    success = good;
-}
-
-void ros_publish_motion(ros_t *self, const ros_machine_t *machine, const ros_odometry_t *odometry) {
-    (void)self;
-    (void)machine;
-    (void)odometry;
-}
-
-void ros_publish_wrench(ros_t *self, const ros_machine_t *machine) {
-    (void)self;
-    (void)machine;
-}
-
-void ros_publish_battery(ros_t *self, const ros_machine_t *machine) {
-    (void)self;
-    (void)machine;
-}
-
-void ros_publish_diagnostics(ros_t *self, const ros_status_t *statuses, int64_t wall_us) {
-    (void)self;
-    (void)statuses;
-    (void)wall_us;
-}
-
-void ros_publish_state(ros_t *self, const char *json) {
-    (void)self;
-    (void)json;
-}
+#include "fake_ros.inc"
 
 // ---- messages -------------------------------------------------------------------------------------------------------
 
@@ -124,10 +29,19 @@ static void request_comes(ros_verb_t verb) {
 static void pass(unsigned for_ms) {
     for (unsigned ms = 0; ms < for_ms; ms += PASS_MS) {
         const iw_time_us_t until_us = daemon_rig.now_us + MS(PASS_MS);
+        const int64_t before_us = bridge.received_us;
         bridge_step(&bridge); // The step may have waited.
+        snapshot_count += (bridge.received_us != before_us) ? 1U : 0U;
         if (daemon_rig.now_us < until_us) {
             hours_run_gateway((unsigned)((until_us - daemon_rig.now_us + 999U) / IW_US_PER_MS));
         }
+    }
+}
+
+static void commands_come(double v_m_s, unsigned count) {
+    for (unsigned i = 0; i < count; i++) {
+        command_comes(v_m_s);
+        pass(20);
     }
 }
 
@@ -139,7 +53,7 @@ static void arm(void) {
 }
 
 void setUp(void) {
-    has_command = has_request = answered = success = false;
+    has_command = has_request = answered = success = is_used = false;
     estop_shown = -1;
     estop_count = 0;
     daemon_rig_begin();
@@ -168,37 +82,28 @@ static void test_ros_command_that_came_with_arm_prevents_it(void) {
 
 static void test_ros_stop_that_came_with_a_command_stops(void) {
     arm();
-    for (unsigned i = 0; i < 10U; i++) {
-        command_comes(0.3);
-        pass(20);
-    }
+    commands_come(0.3, 10);
     TEST_ASSERT_GREATER_THAN_INT16(0, daemon_rig.commanded_mm_s[IW_LEFT]);
     command_comes(0.3);
     request_comes(ROS_STOP);
     pass(2000);
     TEST_ASSERT_TRUE(answered && success);
-    TEST_ASSERT_TRUE(daemon_rig_is_told_zero());
+    TEST_ASSERT_TRUE(daemon_rig_commands_zero());
     TEST_ASSERT_NOT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
 }
 
 static void test_ros_silent_source_stops_before_the_lease_ends(void) {
     bridge.settings.drive.timeout_ms = 100;
     arm();
-    for (unsigned i = 0; i < 10U; i++) {
-        command_comes(0.3);
-        pass(20);
-    }
+    commands_come(0.3, 10);
     pass(150);
     TEST_ASSERT_NOT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
-    TEST_ASSERT_EQUAL_INT(IW_CAUSE_CLIENT_STOP, gw_wheels_look(&daemon_rig.daemon->wheels).stop->cause);
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_CLIENT_STOP, gw_wheels_snapshot(&daemon_rig.daemon->wheels).stop->cause);
 }
 
 static void test_ros_command_that_was_late_is_not_passed(void) {
     arm();
-    for (unsigned i = 0; i < 5U; i++) {
-        command_comes(0.0);
-        pass(20);
-    }
+    commands_come(0.0, 5);
     const uint64_t passed = bridge.facts.commands.passed;
     command_comes(0.3);
     command.sent_us -= 5000000;
@@ -423,7 +328,7 @@ static void test_ros_one_person_without_the_lease_has_nothing(void) {
     TEST_ASSERT_GREATER_THAN_INT16(0, daemon_rig.commanded_mm_s[IW_LEFT]);
 }
 
-static void test_ros_lease_that_ended_unseen_is_nobodys(void) {
+static void test_ros_lease_that_ended_unseen_has_no_holder(void) {
     arm();
     command_comes_of(1, 0.3);
     command_comes_of(1, 0.0);
@@ -462,10 +367,7 @@ static void test_ros_other_machine_without_synchronised_clock_cannot_arm(void) {
 static void test_ros_other_machine_drives_when_its_clock_is_known(void) {
     on_a_network(true);
     arm();
-    for (unsigned i = 0; i < 20U; i++) {
-        command_comes(0.3);
-        pass(20);
-    }
+    commands_come(0.3, 20);
     TEST_ASSERT_EQUAL_UINT64(20, bridge.facts.commands.unknown);
     TEST_ASSERT_EQUAL_UINT64(0, bridge.facts.commands.passed);
     TEST_ASSERT_EQUAL_INT16(0, daemon_rig.commanded_mm_s[IW_LEFT]);
@@ -537,6 +439,61 @@ static void test_ros_bridge_that_only_watches_does_not_arm(void) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, daemon_rig_state());
 }
 
+static unsigned snapshots_in(unsigned for_ms) {
+    const unsigned before = snapshot_count;
+    pass(for_ms);
+    return snapshot_count - before;
+}
+
+static void test_ros_rate_of_snapshots_falls_without_a_node(void) {
+    pass(500);
+    TEST_ASSERT_UINT_WITHIN(2, 40, snapshots_in(2000));
+    is_used = true;
+    pass(200);
+    TEST_ASSERT_UINT_WITHIN(2, 50, snapshots_in(1000));
+    is_used = false;
+    TEST_ASSERT_UINT_WITHIN(2, 40, snapshots_in(800)); // A node that returns within a second finds the full rate.
+    pass(500);
+    const unsigned motions = motion_count;
+    TEST_ASSERT_UINT_WITHIN(2, 20, snapshots_in(1000));
+    TEST_ASSERT_EQUAL_UINT(motions, motion_count);
+    is_used = true;
+    pass(150);
+    TEST_ASSERT_GREATER_THAN_UINT(motions, motion_count);
+    TEST_ASSERT_TRUE(bridge.facts.commands.refused == 0U && bridge.facts.link == ROS_LINK_UP);
+}
+
+static void test_ros_rate_of_snapshots_is_full_with_the_lease(void) {
+    arm();
+    commands_come(0.0, 100);
+    const unsigned before = snapshot_count;
+    commands_come(0.0, 50);
+    TEST_ASSERT_UINT_WITHIN(2, 50, snapshot_count - before);
+}
+
+/// All places of the gateway are in use, one of them by the driver, when the bridge has lost its connection.
+static void test_ros_stop_reaches_a_full_gateway_without_a_connection(void) {
+    sock_clients_t *clients = &daemon_rig.daemon->clients;
+    for (unsigned i = 0; i < 2U; i++) {
+        const int other = daemon_rig_connect();
+        daemon_rig_arm(other);
+        iwc_close(bridge.gateway);
+        pass(20);
+        clients->most[SOCK_DRIVE] = clients->most[SOCK_WATCH] = 1;
+        pass(100);
+        TEST_ASSERT_EQUAL_INT(ROS_LINK_GONE, bridge.facts.link);
+        daemon_rig_drive(other, 300, 300, 100);
+        request_comes((i == 0U) ? ROS_STOP : ROS_ESTOP);
+        pass(20);
+        TEST_ASSERT_TRUE(answered && success);
+        TEST_ASSERT_NOT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
+        (void)close(other);
+        clients->most[SOCK_DRIVE] = clients->most[SOCK_WATCH] = 4;
+        pass(3000);
+        TEST_ASSERT_EQUAL_INT(ROS_LINK_UP, bridge.facts.link);
+    }
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_ros_command_that_came_with_arm_prevents_it);
@@ -557,7 +514,7 @@ int main(void) {
     RUN_TEST(test_ros_one_person_drives_of_two_that_publish);
     RUN_TEST(test_ros_one_person_has_the_wheels_until_they_are_stopped);
     RUN_TEST(test_ros_one_person_without_the_lease_has_nothing);
-    RUN_TEST(test_ros_lease_that_ended_unseen_is_nobodys);
+    RUN_TEST(test_ros_lease_that_ended_unseen_has_no_holder);
     RUN_TEST(test_ros_other_machine_without_synchronised_clock_cannot_arm);
     RUN_TEST(test_ros_other_machine_drives_when_its_clock_is_known);
     RUN_TEST(test_ros_command_of_unknown_clock_does_not_arm);
@@ -565,5 +522,8 @@ int main(void) {
     RUN_TEST(test_ros_request_that_cannot_be_read_only_stops);
     RUN_TEST(test_ros_stop_at_rest_ends_arming_by_commands);
     RUN_TEST(test_ros_bridge_that_only_watches_does_not_arm);
+    RUN_TEST(test_ros_rate_of_snapshots_falls_without_a_node);
+    RUN_TEST(test_ros_rate_of_snapshots_is_full_with_the_lease);
+    RUN_TEST(test_ros_stop_reaches_a_full_gateway_without_a_connection);
     return UNITY_END();
 }

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The logic of iwheel_hardware with the calls of ros2_control and the gateway. Its adapter (system.cpp) needs ros2_control and is not compiled here."""
+"""The logic of iwheel_hardware with the calls of ros2_control and the gateway. system.cpp, its adapter, needs ros2_control: not compiled here."""
 
 import os
 import shutil

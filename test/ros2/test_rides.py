@@ -331,7 +331,7 @@ def stops_are_seen(t):
     time.sleep(0.6)
     t_us = now_us()
     ride.rig.kill_gateway(signal.SIGKILL)
-    seen("gateway", lambda s: s["gateway"] == "gone", "gateway", "gateway gone", t_us)
+    seen("gateway", lambda s: s["gateway"] == "gone", "gateway", "the gateway is gone", t_us)
     time.sleep(1.2)
     ride.restart_gateway(wheels=False, restart_hold=True)
     t.check(ride.await_state(lambda s: s["gateway"] == "up", 4), "the bridge finds it again")
@@ -409,6 +409,17 @@ def gateway_hangs(t):
     t.check(ride.still(0.3), "nothing after reset")
     t.figure(f"seen after {ms:.0f} ms")
     t.judge(ride.rig)
+    replies = {"arm": "the gateway does not answer", "stop": "nothing came in time; if the gateway", "estop": "gateway"}
+    for verb in replies:
+        ride.peer.client(f"iwheel/{verb}")
+    ride.rig.gateway.signal(signal.SIGSTOP)
+    t.check(ride.await_state(lambda s: s["gateway"] == "silent", 2), "silent again")
+    for verb, part in replies.items():
+        t_us = now_us()
+        refused = ride.peer.call(f"iwheel/{verb}")
+        t.check(refused and not refused[0] and part in refused[1], f"{verb}: {refused}")
+        t.check(now_us() - t_us < 500_000, f"{verb}: answered after {now_us() - t_us} us", True, now_us())
+    ride.rig.gateway.signal(signal.SIGCONT)
 
 
 @scenario("bridge killed while driving: ramp within 60 ms; restarted, it moves nothing", 10)
@@ -547,7 +558,7 @@ def names(t):
 @scenario("starts before the gateway; only watches where configured; its command line", 12)
 def starts(t):
     ride = Ride(t, {"drive": {"enabled": "no"}}, gateway=False)
-    t.check(ride.await_diagnosis("gateway", "gateway gone") == 2, "reports the missing gateway")
+    t.check(ride.await_diagnosis("gateway", "the gateway is gone") == 2, "reports the missing gateway")
     ride.restart_gateway()
     t.check(ride.await_state(lambda s: s["gateway"] == "up", 4), "finds the gateway when it starts")
     answer = ride.peer.call("iwheel/arm")

@@ -4,8 +4,10 @@
 import math
 import os
 import re
+import shutil
 import signal
 import subprocess
+import tempfile
 import time
 from pathlib import Path
 
@@ -15,6 +17,7 @@ from jazzy import ROOT, Jazzy, finish
 from ride import Ride, now_us
 from scenario import Skip, scenario
 
+# `t.rule` in a scenario without time limits: a stall of the machine does not explain a failure there.
 SEEN_S = 12  # Limit from a typed command to its effect: Python starts, and DDS discovers.
 TRIGGER = "std_srvs/srv/Trigger"
 STAND_IN = "typed.py"  # Only this program prints when it sent the request.
@@ -109,7 +112,7 @@ def graph(t, vendor):
 def services(t, vendor):
     typed = Typed(t, vendor)
     ride = typed.ride
-    typed.call("reset", r"success=False", r"not over the network", r"iwheelctl reset")
+    typed.call("reset", r"success=False", r"not permitted over the network", r"iwheelctl reset")
     typed.call("arm", r"success=True", r"send cmd_vel at 15 Hz or more")
     ride.silence()
     for verb, wanted in (("stop", lambda speed: speed < 300), ("estop", lambda speed: speed == 0)):
@@ -236,7 +239,7 @@ def typed_drive(t):
 def table_is_whole(t):
     services_typed = {f"ros2 service call /iwheel/{verb} {TRIGGER}" for verb in ("arm", "stop", "estop", "reset")}
     tested = {*GRAPH, *PUBLISHED, *DRIVES, *services_typed, "ros2 topic hz /odom", "ROS_DOMAIN_ID=99 ros2 node list"}
-    t.check(set(rows()) == tested, f"only on the page: {set(rows()) - tested}; only here: {tested - set(rows())}")
+    t.rule(set(rows()) == tested, f"only on the page: {set(rows()) - tested}; only here: {tested - set(rows())}")
 
 
 @scenario("without the profile, and from another domain, Fast DDS does not find the bridge", 20)
@@ -344,23 +347,23 @@ def gamepad_deadman(t):
     exec(compile(pure, "joystick.py", "exec"), space)  # This part runs without ROS.
     pad = space["Deadman"](2.0)
     pad.report(True, 0.4, 0.0, 0.0)
-    t.check(pad.step(0.1) is None, "held from the start: nothing")
+    t.rule(pad.step(0.1) is None, "held from the start: nothing")
     pad.report(False, 0.0, 0.0, 0.2)
     pad.report(True, 0.4, 0.1, 0.3)
-    t.check(pad.step(2.2) == (0.4, 0.1), "it drives while it reports")
-    t.check(pad.step(2.4) == (0.0, 0.0) and pad.step(2.8) == (0.0, 0.0), "no report for 2 s: zeros")
-    t.check(pad.step(3.0) is None, "then nothing")
+    t.rule(pad.step(2.2) == (0.4, 0.1), "it drives while it reports")
+    t.rule(pad.step(2.4) == (0.0, 0.0) and pad.step(2.8) == (0.0, 0.0), "no report for 2 s: zeros")
+    t.rule(pad.step(3.0) is None, "then nothing")
     pad.report(True, 0.4, 0.0, 3.1)
-    t.check(pad.step(3.2) is None, "the link is back with the button held: nothing")
+    t.rule(pad.step(3.2) is None, "the link is back with the button held: nothing")
     pad.report(False, 0.0, 0.0, 3.3)
     pad.report(True, 0.2, 0.0, 3.4)
-    t.check(pad.step(3.5) == (0.2, 0.0), "released and held again")
+    t.rule(pad.step(3.5) == (0.2, 0.0), "released and held again")
     pad.report(True, math.nan, 0.0, 3.6)
-    t.check(pad.step(3.7) == (0.0, 0.0), "a missing axis ends it")
+    t.rule(pad.step(3.7) == (0.0, 0.0), "a missing axis ends it")
     for wrong in (0.0, -1.0, 2.1, math.nan):
         try:
             space["Deadman"](wrong)
-            t.check(False, f"a timeout of {wrong} s is accepted")
+            t.rule(False, f"a timeout of {wrong} s is accepted")
         except ValueError:
             pass
 
@@ -427,4 +430,77 @@ def description(t):
         raise Skip("no xacro: scripts/python_packages build/ros-jazzy requirements/ros-jazzy.txt installs it")
     text = done.stdout
     for part in ('name="left_wheel_joint"', 'name="right_wheel_joint"', 'name="w1/left_handle"', 'name="w1/base_link"', 'radius="0.2"', 'xyz="0 0.3 0.2"'):
-        t.check(part in text, f"{part} is not in {text[-1500:]}")
+        t.rule(part in text, f"{part} is not in {text[-1500:]}")
+
+
+INSTALLED = """
+import os
+from ament_index_python.packages import get_package_prefix, get_package_share_directory
+programs = os.path.join(get_package_prefix("iwheel_bringup"), "lib", "iwheel_bringup")
+print(*sorted(os.listdir(programs)))
+for package, files in (("iwheel_bringup", ("launch/iwheel.launch.py", "config/joystick.yaml")),
+                       ("iwheel_description", ("launch/description.launch.py", "urdf/iwheel.urdf.xacro", "rviz/iwheel.rviz"))):
+    print("missing:", *(name for name in files if not os.path.isfile(os.path.join(get_package_share_directory(package), name))), flush=True)
+os.execv(os.path.join(programs, "drive"), ["drive", "--help"])
+"""
+
+
+# Stand-ins for launch and launch_ros, which no package index has: every path and every own node of the launch files exists, and every argument is declared.
+LAUNCHED = """
+import os, runpy, sys, types
+from ament_index_python.packages import get_package_prefix, get_package_share_directory
+NAMES = {
+    "launch": "LaunchDescription", "launch.actions": "DeclareLaunchArgument IncludeLaunchDescription", "launch.conditions": "IfCondition",
+    "launch.launch_description_sources": "PythonLaunchDescriptionSource", "launch.substitutions": "Command LaunchConfiguration PathJoinSubstitution",
+    "launch_ros": "", "launch_ros.actions": "Node", "launch_ros.parameter_descriptions": "ParameterValue", "launch_ros.substitutions": "FindPackageShare",
+}
+made = []
+def class_of(name):
+    def make(*words, **named):
+        result = {"FindPackageShare": get_package_share_directory, "PathJoinSubstitution": lambda parts: os.path.join(*parts)}.get(name, lambda *_, **__: words)
+        made.append((name, result(*words, **named), named))
+        return made[-1][1]
+    return make
+for module, names in NAMES.items():
+    sys.modules[module] = types.ModuleType(module)
+    vars(sys.modules[module]).update({name: class_of(name) for name in names.split()})
+for package, file in (("iwheel_bringup", "iwheel.launch.py"), ("iwheel_description", "description.launch.py")):
+    made.clear()
+    runpy.run_path(os.path.join(get_package_share_directory(package), "launch", file))["generate_launch_description"]()
+    declared = {words[0] for name, words, _ in made if name == "DeclareLaunchArgument"}
+    print(file, "undeclared:", *({words[0] for name, words, _ in made if name == "LaunchConfiguration"} - declared))
+    print(file, "no file:", *(path for name, path, _ in made if name == "PathJoinSubstitution" and not os.path.isfile(path)))
+    nodes = [(named["package"], named["executable"]) for name, _, named in made if name == "Node"]
+    print(file, "no program:", *(node for node in nodes if node[0].startswith("iwheel") and not os.access(os.path.join(get_package_prefix(node[0]), "lib", *node), os.X_OK)))
+    print(file, "starts:", *("/".join(node) for node in nodes))
+"""
+
+
+def colcon_recipe():
+    """The page's commands for the packages, without the installation."""
+    (page,) = Path(ROOT, "docs").rglob("ros2.md")
+    block = re.search(r"^## Packages for colcon\n\n((?: {4}.+\n)+)", page.read_text(encoding="utf-8"), re.MULTILINE)
+    lines = [line for line in block[1].splitlines() if "sudo apt " not in line]
+    return "\n".join(lines).replace("/usr/share/iwheel-ros2", os.path.join(ROOT, "share", "ros2"))
+
+
+@scenario("the page's commands for colcon build the packages with Jazzy's ament_cmake; ROS finds the nodes, the launch files and the model", 60)
+def packages_for_colcon(t):
+    jazzy, colcon = Jazzy(1), shutil.which("colcon")
+    if colcon is None:
+        raise Skip("colcon is missing: scripts/install_tools check installs it")
+    # ament's scripts run in the Python of ROS, and use the modules of Debian's colcon.
+    modules = [os.path.join(os.path.dirname(os.path.dirname(colcon)), "lib", "python3", "dist-packages"), "/usr/lib/python3/dist-packages"]
+    with tempfile.TemporaryDirectory() as home:
+        environment = {
+            **jazzy.environment, "HOME": home, "PATH": os.path.dirname(jazzy.python) + ":" + os.environ["PATH"], "CMAKE_PREFIX_PATH": jazzy.folder,
+            "PYTHONPATH": ":".join(modules), "INSTALLED": INSTALLED, "LAUNCHED": LAUNCHED,
+        }  # fmt: skip
+        script = f'set -e\n{colcon_recipe()}\npython3 -c "$LAUNCHED"\npython3 -c "$INSTALLED"'
+        done = subprocess.run(["sh", "-c", script], env=environment, capture_output=True, text=True, timeout=300, check=False)
+    launched = (
+        r"^iwheel\.launch\.py undeclared:\n.* no file:\n.* no program:\n.* starts: joy/joy_node iwheel_bringup/joystick$",
+        r"^description\.launch\.py undeclared:\n.* no file:\n.* no program:\n.* starts: robot_state_publisher/robot_state_publisher rviz2/rviz2$",
+    )
+    for part in (*launched, r"^drive drive\.py joystick joystick\.py$", r"^missing:\nmissing:\n", r"^usage: drive "):
+        t.rule(re.search(part, done.stdout, re.MULTILINE), f"{part} is not in {done.stdout[-800:]} {done.stderr[-1200:]}")

@@ -175,9 +175,9 @@ static iw_time_us_t cycle(void) {
     const bool more = brd_host_receive(&host, wheels.now_us);
     static iw_snapshot_t seen;
     seen = gw_wheels_step(&wheels);
-    const iw_time_us_t tell_us = brd_host_report(&host, &seen, wheels.hal.estop_last != 0);
+    const iw_time_us_t report_us = brd_host_report(&host, &seen, wheels.hal.estop_last != 0);
     brd_serial_step();
-    const iw_time_us_t next_us = (tell_us < wheels.step_us) ? tell_us : wheels.step_us;
+    const iw_time_us_t next_us = (report_us < wheels.step_us) ? report_us : wheels.step_us;
     return more ? wheels.now_us : next_us;
 }
 

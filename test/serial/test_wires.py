@@ -333,7 +333,7 @@ def deaf(t):
     t.check(rig.wait_status(client, lambda s: s.get("state") == "listening", 6), "listening")
 
 
-@scenario("delayed by the wire for longer than the lease, nothing is obeyed", 5)
+@scenario("commands that the wire delays for longer than the lease move no wheel", 5)
 def delayed(t):
     rig, client = begin(t)
     t.drive_for(client, 200, 200, 0.4)
@@ -493,7 +493,7 @@ def talking(sock, sent):
         talker.join()
 
 
-def check_told(t, rig, sent, words, seconds):
+def check_reported(t, rig, sent, words, seconds):
     """Checks that the log and a new client get this reason within that time."""
     t.check(rig.await_relay(words, seconds), f"{sent[:20]}: {words!r} expected, its output: {rig.gateway.text()[-400:]}")
     reply = rig.client().read_reply(1.0)
@@ -508,7 +508,7 @@ def explained(t):
         rig.cable = Cable(rig.path("port"), ours)
         with talking(theirs, sent):
             relay = rig.start_relay()
-            check_told(t, rig, sent, words, 8.0)
+            check_reported(t, rig, sent, words, 8.0)
             relay.end()
         rig.cable.end()
         theirs.close()
@@ -523,7 +523,7 @@ def explained_anew(t):
     rig.start_relay()
     for sent, words in troubles():
         with talking(theirs, sent):
-            check_told(t, rig, sent, words, 8.0)
+            check_reported(t, rig, sent, words, 8.0)
     theirs.close()
 
 

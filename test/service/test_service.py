@@ -119,6 +119,13 @@ class Units(unittest.TestCase):
                 ours = [line for line in done.stderr.splitlines() if "iwheel" in line]
                 self.assertEqual((ours, done.returncode), ([], 0), done.stderr)
 
+    def test_systemd_waits_for_the_longest_hold(self):
+        """SIGKILL earlier would end the zeros while a wheel still moves."""
+        longest_s = int(re.search(r"^hold_max_s = .*; 10\.\.(\d+) s", read("gateway.conf"), re.MULTILINE)[1])
+        for unit in GATEWAYS:
+            (wait,) = values(unit, "TimeoutStopSec")
+            self.assertGreaterEqual(int(wait.removesuffix("s")), longest_s + 30, unit)
+
     def test_watching_bridges_are_confined_and_not_autostarted(self):
         need("systemd-analyze")
         for unit, ends in ((WEB, "64 77 78"), (MQTT, "64 73 77 78")):

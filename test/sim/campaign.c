@@ -38,14 +38,14 @@ static void shrink(const campaign_t *self, uint32_t rule) {
     }
 }
 
-void campaign_tell_broken(uint64_t seed, const verdict_t *failed) {
+void campaign_print_broken(uint64_t seed, const verdict_t *failed) {
     printf("FAILED seed %llu at %.6f s, rule %u: %s\n", (unsigned long long)seed, (double)failed->broken_us / 1e6,
            (unsigned)failed->rule, failed->text);
 }
 
-void campaign_tell_failure(const campaign_t *self, uint64_t seed, const verdict_t *failed) {
+void campaign_print_failure(const campaign_t *self, uint64_t seed, const verdict_t *failed) {
     const size_t drawn = *self->count;
-    campaign_tell_broken(seed, failed);
+    campaign_print_broken(seed, failed);
     shrink(self, failed->rule);
     const verdict_t small = self->play(IW_NEVER);
     printf("made small: %zu of %zu events; rule %u at %.6f s: %s\n", *self->count, drawn, (unsigned)small.rule,
@@ -73,9 +73,9 @@ static bool passes(const campaign_t *self, uint64_t seed, bool quick) {
         return seed % REPLAY_EACH != 0U || replays(self, seed, verdict.hash);
     }
     if (quick) {
-        campaign_tell_broken(seed, &verdict);
+        campaign_print_broken(seed, &verdict);
     } else {
-        campaign_tell_failure(self, seed, &verdict);
+        campaign_print_failure(self, seed, &verdict);
     }
     return false;
 }
@@ -90,7 +90,7 @@ int campaign_run(const campaign_t *self, uint64_t first, bool quick) {
             failed++;
         }
     }
-    self->tell_sum();
+    self->print_sum();
     printf("%u passed, %u failed, 0 skipped\n", passed, failed);
     return (failed == 0U && passed > 0U) ? EXIT_SUCCESS : EXIT_FAILURE;
 }

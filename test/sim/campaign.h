@@ -35,15 +35,15 @@ typedef struct {
     void (*print)(void);                           ///< Prints the scenario, a line for each event.
     void (*add)(void);                             ///< Adds the result of the last run to the sum of all.
     bool (*enough)(void);                          ///< True if enough has been played.
-    void (*tell_sum)(void);
+    void (*print_sum)(void);
     iw_time_us_t trace_us; ///< Length of the timeline of a small scenario, before its end.
 } campaign_t;
 
 /// Prints the rule that the scenario breaks, makes the scenario small, and prints it with the timeline before its end.
-void campaign_tell_failure(const campaign_t *self, uint64_t seed, const verdict_t *failed);
+void campaign_print_failure(const campaign_t *self, uint64_t seed, const verdict_t *failed);
 
 /// Prints the broken rule in one line.
-void campaign_tell_broken(uint64_t seed, const verdict_t *failed);
+void campaign_print_broken(uint64_t seed, const verdict_t *failed);
 
 /// Plays seeds from `first` on until it is enough or three have failed; each 25th is played twice and must have the same result. `quick`:
 /// ends at the first seed that fails and does not make it small. Returns an exit status; the last line is "N passed, N failed, 0 skipped".

@@ -51,7 +51,7 @@ static bool enough(void) {
     return seeds_left == 0U || (wanted_hours > 0.0 && (double)sum.simulated_us / US_PER_HOUR >= wanted_hours);
 }
 
-static void tell_sum(void) {
+static void print_sum(void) {
     printf("summary hours %.2f steps %llu frames %llu nonzero %llu requests %llu armed %llu drives %llu\n",
            (double)sum.simulated_us / US_PER_HOUR, (unsigned long long)sum.steps, (unsigned long long)sum.frames,
            (unsigned long long)sum.nonzero, (unsigned long long)sum.requests, (unsigned long long)sum.armed,
@@ -68,7 +68,7 @@ static void tell_sum(void) {
 }
 
 static const campaign_t campaign = {&scenario.count, scenario.event, draw,    play, print, add,
-                                    enough,          tell_sum,       TRACE_US};
+                                    enough,          print_sum,      TRACE_US};
 
 static int play_one(uint64_t seed, bool trace, bool events) {
     draw(seed);
@@ -78,14 +78,14 @@ static int play_one(uint64_t seed, bool trace, bool events) {
     const verdict_t verdict = play(trace ? 0U : IW_NEVER);
     const bool good = verdict.rule == ORACLE_NO_RULE;
     if (!good) {
-        campaign_tell_failure(&campaign, seed, &verdict);
+        campaign_print_failure(&campaign, seed, &verdict);
     }
     printf("seed %llu hash %016llx\n", (unsigned long long)seed, (unsigned long long)verdict.hash);
     printf("%d passed, %d failed, 0 skipped\n", good, !good);
     return good ? EXIT_SUCCESS : EXIT_FAILURE;
 }
 
-static int tell_hashes(uint64_t first, uint64_t count) {
+static int print_hashes(uint64_t first, uint64_t count) {
     for (uint64_t seed = first; seed < first + count; seed++) {
         draw(seed);
         printf("seed %llu hash %016llx\n", (unsigned long long)seed, (unsigned long long)play(IW_NEVER).hash);
@@ -135,7 +135,7 @@ static int carry_out(const options_t *options) {
         return play_one(options->seed, options->trace, options->events);
     }
     if (options->hashes) {
-        return tell_hashes(options->first, (options->count == MANY) ? 10U : options->count);
+        return print_hashes(options->first, (options->count == MANY) ? 10U : options->count);
     }
     const bool bounded = options->hours > 0.0 || options->count != MANY;
     wanted_hours = bounded ? options->hours : 1.0;

@@ -157,7 +157,7 @@ static int32_t word(const uint8_t *bytes) {
     return (value >= 32768) ? value - 65536 : value;
 }
 
-static void hear_speed(oracle_t *self, iw_time_us_t now_us, oracle_wheel_t *wheel, int32_t rpm) {
+static void receive_speed(oracle_t *self, iw_time_us_t now_us, oracle_wheel_t *wheel, int32_t rpm) {
     const bool gap = oracle_elapsed(now_us, wheel->fresh_us, oracle_us(self->config->wheel_silent_ms));
     wheel->rpm = rpm;
     if (abs(rpm) > self->config->rest_rpm) {
@@ -170,7 +170,7 @@ static void hear_speed(oracle_t *self, iw_time_us_t now_us, oracle_wheel_t *whee
     }
 }
 
-static void hear_ticks(oracle_t *self, iw_time_us_t now_us, oracle_wheel_t *wheel, const uint8_t *bytes) {
+static void receive_ticks(oracle_t *self, iw_time_us_t now_us, oracle_wheel_t *wheel, const uint8_t *bytes) {
     const uint32_t raw = (uint32_t)bytes[0] << 24 | (uint32_t)bytes[1] << 16 | (uint32_t)bytes[2] << 8 | bytes[3];
     const uint32_t moved = raw - (uint32_t)wheel->ticks;
     const int64_t way = (moved > INT32_MAX) ? (int64_t)moved - UINT32_MAX - 1 : (int64_t)moved;
@@ -183,7 +183,7 @@ static void hear_ticks(oracle_t *self, iw_time_us_t now_us, oracle_wheel_t *whee
 }
 
 /// Telemetry of a wheel was received.
-static void hear_wheel(oracle_t *self, iw_time_us_t now_us, size_t side, bool offset) {
+static void receive_wheel(oracle_t *self, iw_time_us_t now_us, size_t side, bool offset) {
     oracle_wheel_t *const wheel = &self->wheel[side];
     if (wheel->offset_us == IW_NEVER) {
         wheel->offset_us = now_us;
@@ -195,7 +195,7 @@ static void hear_wheel(oracle_t *self, iw_time_us_t now_us, size_t side, bool of
     }
 }
 
-static void hear_echo(oracle_t *self, oracle_wheel_t *wheel) {
+static void receive_echo(oracle_t *self, oracle_wheel_t *wheel) {
     (void)self;
     if (wheel->pending == 0U) {
         return;
@@ -211,7 +211,7 @@ void oracle_received(oracle_t *self, iw_time_us_t now_us, const iw_can_frame_t *
     self->received++;
     if (frame->id == 266U || frame->id == 298U) {
         if (frame->kind == IW_CAN_ECHO) {
-            hear_echo(self, wheel);
+            receive_echo(self, wheel);
             return;
         }
         self->foreign_us = now_us;
@@ -220,12 +220,12 @@ void oracle_received(oracle_t *self, iw_time_us_t now_us, const iw_can_frame_t *
         oracle_hold_foreign(self);
         oracle_hard_stop(self);
     } else if ((frame->id == 256U || frame->id == 288U) && frame->dlc >= 4U && frame->dlc <= 8U) {
-        hear_speed(self, now_us, wheel, word(frame->data));
-        hear_wheel(self, now_us, right ? IW_RIGHT : IW_LEFT, false);
+        receive_speed(self, now_us, wheel, word(frame->data));
+        receive_wheel(self, now_us, right ? IW_RIGHT : IW_LEFT, false);
     } else if ((frame->id == 257U || frame->id == 289U) && frame->dlc >= 7U && frame->dlc <= 8U) {
-        hear_ticks(self, now_us, wheel, &frame->data[2]);
+        receive_ticks(self, now_us, wheel, &frame->data[2]);
     } else if ((frame->id == 513U || frame->id == 545U) && frame->dlc >= 2U && frame->dlc <= 8U) {
-        hear_wheel(self, now_us, right ? IW_RIGHT : IW_LEFT, true);
+        receive_wheel(self, now_us, right ? IW_RIGHT : IW_LEFT, true);
     }
 }
 

@@ -29,7 +29,7 @@ daemon_rig_t daemon_rig;
 // The clocks ---------------------------------------------------------------------------------------------------------------
 
 iw_time_us_t iwl_clock_now_us(void) {
-    daemon_rig.now_us += daemon_rig.look_takes_us;
+    daemon_rig.now_us += daemon_rig.poll_takes_us;
     return daemon_rig.now_us;
 }
 
@@ -90,7 +90,7 @@ static int send_one(daemon_rig_t *rig, const iw_can_frame_t *frame) {
     rig->unmarked += (rig->commanded_mm_s[side] == 0 || daemon_rig_marked()) ? 0U : 1U;
     rig->most_mm_s =
         (abs(rig->commanded_mm_s[side]) > rig->most_mm_s) ? (int16_t)abs(rig->commanded_mm_s[side]) : rig->most_mm_s;
-    rig->told_mA[side] = (int16_t)(frame->data[3] << 8 | frame->data[4]);
+    rig->commanded_mA[side] = (int16_t)(frame->data[3] << 8 | frame->data[4]);
     rig->sent_us = rig->now_us;
     rig->sent_waits = rig->waits;
     sim_world_submit(&rig->world, rig->now_us, rig->port, frame);
@@ -165,9 +165,9 @@ static int rig_pressed(void *self, bool quiet) {
     }
     const bool pulse = rig->estop_pulse && !quiet; // The port reads edges only after the wait has reported the line.
     rig->polls++;
-    rig->unlooked_us = rig->now_us - rig->looked_us;
-    rig->looked_us = rig->now_us;
-    rig->estop_told = rig->estop;
+    rig->unpolled_us = rig->now_us - rig->polled_us;
+    rig->polled_us = rig->now_us;
+    rig->estop_reported = rig->estop;
     rig->estop_pulse = rig->estop_pulse && quiet;
     return (rig->estop == 0 && pulse) ? 1 : rig->estop;
 }
@@ -210,7 +210,7 @@ static void show(int fd, bool readable) {
 
 static int find_events(daemon_rig_t *rig, int fd, struct epoll_event *events, int max) {
     show(rig->bus_fd, rig->rx_next < rig->rx_count);
-    show(rig->estop_fd, rig->estop_pulse || (rig->estop != rig->estop_told && !rig->estop_silent));
+    show(rig->estop_fd, rig->estop_pulse || (rig->estop != rig->estop_reported && !rig->estop_silent));
     const int count = epoll_wait(fd, events, max, 0);
     return (count > 0) ? count : 0;
 }
@@ -473,6 +473,6 @@ void daemon_rig_begin_driving(int client) {
     TEST_ASSERT_EQUAL_INT(500, daemon_rig.commanded_mm_s[IW_RIGHT]);
 }
 
-bool daemon_rig_is_told_zero(void) {
+bool daemon_rig_commands_zero(void) {
     return daemon_rig.commanded_mm_s[IW_LEFT] == 0 && daemon_rig.commanded_mm_s[IW_RIGHT] == 0;
 }

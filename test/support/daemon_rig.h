@@ -25,7 +25,7 @@ typedef struct {
     iw_time_us_t now_us;
     iw_time_us_t until_us;      ///< End of `daemon_rig_run`.
     iw_time_us_t suspended_us;  ///< Total suspend time that the clocks report.
-    iw_time_us_t look_takes_us; ///< Duration of each read of the clock.
+    iw_time_us_t poll_takes_us; ///< Duration of each read of the clock.
     iw_time_us_t stolen_us;     ///< The next wait is longer by this time: the process does not run.
     iw_bus_state_t bus;         ///< State that the bus reports.
     iwl_bus_link_t link;        ///< Facts that the bus reports about its link.
@@ -37,22 +37,22 @@ typedef struct {
     uint32_t waits;    ///< Waits of the loop.
     iw_time_us_t wait_from_us; ///< Time that the loop passed to the last wait; 0: none, the wait reads the clock.
     uint32_t polls;            ///< Polls of the button.
-    iw_time_us_t looked_us;    ///< Time of the last poll of the button.
-    iw_time_us_t unlooked_us;  ///< Time without a poll of the button before the poll that belongs to the last setpoint.
+    iw_time_us_t polled_us;    ///< Time of the last poll of the button.
+    iw_time_us_t unpolled_us;  ///< Time without a poll of the button before the poll that belongs to the last setpoint.
     int16_t most_mm_s;         ///< Fastest setpoint sent since a test set this to zero.
     bool ended;                ///< The loop ended on its own.
     bool hold;                 ///< The next start uses after_stop = hold.
     bool full;                 ///< The bus accepts no frame.
     uint32_t unmarked;         ///< Nonzero setpoints sent while there was no crash marker.
     uint32_t sent[IW_SIDES];   ///< Setpoints sent.
-    int16_t told_mA[IW_SIDES]; ///< Current of the last setpoint.
+    int16_t commanded_mA[IW_SIDES];   ///< Current of the last setpoint.
     int16_t commanded_mm_s[IW_SIDES]; ///< Speed of the last setpoint.
     iw_time_us_t sent_us;             ///< Time of the last setpoint.
     uint32_t sent_waits;              ///< Number of waits before the last setpoint.
     iw_can_frame_t rx[DAEMON_RX_MAX];
     unsigned rx_count;
     unsigned rx_next;
-    int estop_told; ///< State of the button that its descriptor has reported.
+    int estop_reported; ///< State of the button that its descriptor has reported.
     int bus_fd;
     int estop_fd;
     int listen_fd;
@@ -103,6 +103,6 @@ iw_state_t daemon_rig_state(void);
 void daemon_rig_begin_driving(int client);
 
 /// True if the last setpoint of both wheels is zero.
-bool daemon_rig_is_told_zero(void);
+bool daemon_rig_commands_zero(void);
 
 #endif

@@ -23,7 +23,7 @@ void fake_bus_init(fake_bus_t *self, iw_time_us_t now_us) {
     self->echo_delay_us = 300;
     for (size_t side = 0; side < IW_SIDES; side++) {
         self->send_result[side] = 1;
-        self->told_us[side] = IW_NEVER;
+        self->commanded_us[side] = IW_NEVER;
     }
 }
 
@@ -84,8 +84,9 @@ static int fake_receive(void *context, iw_can_frame_t *out_frame) {
 /// Reports a loss that has already ended exactly once.
 static iw_bus_state_t fake_state(void *context) {
     fake_bus_t *const self = context;
-    const iw_bus_state_t reported = (self->loss_untold && self->state >= IW_BUS_PASSIVE) ? IW_BUS_DOWN : self->state;
-    self->loss_untold = false;
+    const iw_bus_state_t reported =
+        (self->loss_unreported && self->state >= IW_BUS_PASSIVE) ? IW_BUS_DOWN : self->state;
+    self->loss_unreported = false;
     return reported;
 }
 
@@ -147,7 +148,7 @@ void fake_bus_advance(fake_bus_t *self, iw_time_us_t now_us) {
     while (fake_bus_next_us(self) <= now_us) {
         iw_can_frame_t echo = self->flight[0].frame;
         self->commanded_mm_s[side_of(&echo)] = fake_bus_command(&echo).speed_mm_s;
-        self->told_us[side_of(&echo)] = now_us;
+        self->commanded_us[side_of(&echo)] = now_us;
         echo.kind = IW_CAN_ECHO;
         fake_bus_put(self, &echo);
         self->flights--;
@@ -157,6 +158,6 @@ void fake_bus_advance(fake_bus_t *self, iw_time_us_t now_us) {
 
 void fake_bus_break(fake_bus_t *self, iw_bus_state_t state) {
     self->state = state;
-    self->loss_untold = true;
+    self->loss_unreported = true;
     forget_flights(self);
 }

@@ -30,7 +30,7 @@ typedef struct {
     int send_result[IW_SIDES];  ///< Result of `send` for each wheel's setpoint; 1 at first.
     iw_time_us_t echo_delay_us; ///< From `send` to the left one's echo; 300 at first.
     bool acknowledged;          ///< False: no node acknowledges, so no frame gets onto the bus.
-    bool loss_untold;           ///< The bus broke and `bus_state` has not reported it yet.
+    bool loss_unreported;       ///< The bus broke and `bus_state` has not reported it yet.
     iw_bus_state_t state;
     int purge_result;
     int estop_level; ///< Result of `estop_pressed`.
@@ -42,18 +42,18 @@ typedef struct {
 
     /// Recorded by the bus.
     iw_time_us_t now_us;
-    uint32_t sent;                    ///< Frames accepted.
-    uint32_t refused;                 ///< Frames not accepted.
-    uint32_t calls;                   ///< Calls of `send`.
-    uint32_t call_frame;              ///< Position of the frame in its call, for the listener ...
-    uint32_t call_frames;             ///< ... and how many frames the call has.
-    uint32_t purges;                  ///< Calls of `purge`.
-    uint32_t lost;                    ///< Frames that found the receive queue full.
-    iw_can_frame_t last[IW_SIDES];    ///< Last setpoint accepted for each wheel.
-    iw_time_us_t last_us[IW_SIDES];   ///< Time of that setpoint.
-    int16_t commanded_mm_s[IW_SIDES]; ///< Speed that reached each wheel, as on the bus.
-    iw_time_us_t told_us[IW_SIDES];   ///< Time of that; IW_NEVER: no setpoint yet.
-    uint8_t unechoed[IW_SIDES];       ///< Accepted, and the gateway has not received the echo yet.
+    uint32_t sent;                       ///< Frames accepted.
+    uint32_t refused;                    ///< Frames not accepted.
+    uint32_t calls;                      ///< Calls of `send`.
+    uint32_t call_frame;                 ///< Position of the frame in its call, for the listener ...
+    uint32_t call_frames;                ///< ... and how many frames the call has.
+    uint32_t purges;                     ///< Calls of `purge`.
+    uint32_t lost;                       ///< Frames that found the receive queue full.
+    iw_can_frame_t last[IW_SIDES];       ///< Last setpoint accepted for each wheel.
+    iw_time_us_t last_us[IW_SIDES];      ///< Time of that setpoint.
+    int16_t commanded_mm_s[IW_SIDES];    ///< Speed that reached each wheel, as on the bus.
+    iw_time_us_t commanded_us[IW_SIDES]; ///< Time of that; IW_NEVER: no setpoint yet.
+    uint8_t unechoed[IW_SIDES];          ///< Accepted, and the gateway has not received the echo yet.
     fake_flight_t flight[FAKE_BUS_FLIGHT_MAX];
     iw_can_frame_t rx[FAKE_BUS_RX_MAX];
     uint32_t flights;

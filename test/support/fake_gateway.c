@@ -22,7 +22,7 @@ void fake_gateway_open(fake_gateway_t *self) {
     (void)snprintf(address.sun_path, sizeof address.sun_path, "%s", self->path);
     self->listen_fd = socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
     TEST_ASSERT_EQUAL(0, bind(self->listen_fd, (const struct sockaddr *)&address, sizeof address));
-    TEST_ASSERT_EQUAL(0, listen(self->listen_fd, 64));
+    TEST_ASSERT_EQUAL(0, listen(self->listen_fd, 8));
 }
 
 void fake_gateway_close(fake_gateway_t *self) {

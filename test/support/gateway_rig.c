@@ -51,7 +51,7 @@ static int16_t rpm_of(const gateway_rig_t *self, size_t side) {
     if (self->wheel[side].rpm_fixed) {
         return self->wheel[side].rpm;
     }
-    if (bus->told_us[side] == IW_NEVER || self->now_us - bus->told_us[side] > IW_WHEEL_WATCHDOG_US) {
+    if (bus->commanded_us[side] == IW_NEVER || self->now_us - bus->commanded_us[side] > IW_WHEEL_WATCHDOG_US) {
         return 0;
     }
     return (int16_t)(bus->commanded_mm_s[side] * 1000 / UM_S_PER_RPM);
@@ -205,7 +205,7 @@ void gateway_rig_foreign(gateway_rig_t *self, uint32_t id) {
     fake_bus_put_empty(&self->bus, id, 5);
 }
 
-bool gateway_rig_told_zero(const gateway_rig_t *self) {
+bool gateway_rig_commands_zero(const gateway_rig_t *self) {
     for (size_t side = 0; side < IW_SIDES; side++) {
         const iw_command_t command = fake_bus_command(&self->bus.last[side]);
         const bool current_zero = self->config.current_role == IW_ROLE_LIMIT || command.current_mA == 0;
@@ -216,7 +216,7 @@ bool gateway_rig_told_zero(const gateway_rig_t *self) {
     return true;
 }
 
-iw_snapshot_t gateway_rig_look(const gateway_rig_t *self) {
+iw_snapshot_t gateway_rig_snapshot(const gateway_rig_t *self) {
     iw_snapshot_t seen;
     iw_gateway_snapshot(&self->gateway, self->now_us, &seen);
     return seen;

@@ -69,9 +69,9 @@ void gateway_rig_press(gateway_rig_t *self, bool pressed);
 void gateway_rig_foreign(gateway_rig_t *self, uint32_t id);
 
 /// True if the last setpoints accepted for both wheels are zero.
-bool gateway_rig_told_zero(const gateway_rig_t *self);
+bool gateway_rig_commands_zero(const gateway_rig_t *self);
 
 /// Returns a snapshot of the gateway.
-iw_snapshot_t gateway_rig_look(const gateway_rig_t *self);
+iw_snapshot_t gateway_rig_snapshot(const gateway_rig_t *self);
 
 #endif

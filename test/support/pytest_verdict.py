@@ -11,7 +11,7 @@ is "N passed, N failed, N skipped". The exit status is that of verdict.summary.
     --keep         retains the folders of the tests         --sample=-N    the tests that --sample N leaves out
     --pdb          runs all tests in this process and judges nothing
 
-A fixture that is a verdict.Evidence collects the findings of a test. If a test fails, the result of a fixture's `said()` is shown and judged too.
+A fixture that is a verdict.Findings collects the findings of a test. If a test fails, the result of a fixture's `said()` is shown and judged too.
 @pytest.mark.full: only with IWHEEL_FULL=1. @pytest.mark.exact: no result depends on time. record_property("tests", N): the test counts as N tests.
 -rP shows the output of passed tests.
 """
@@ -102,20 +102,20 @@ def sample(items, key, number):
 # ---- in the process of an attempt ------------------------------------------------------------------------------------
 
 
-def evidence_of(item):
-    return [one for one in (getattr(item, "funcargs", None) or {}).values() if isinstance(one, verdict.Evidence)]
+def findings_of(item):
+    return [one for one in (getattr(item, "funcargs", None) or {}).values() if isinstance(one, verdict.Findings)]
 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_pyfunc_call(pyfuncitem):
-    """A finding of the test's Evidence fails the test, even if the test is skipped after it."""
+    """One of the Findings of a test fails the test, even if the test is skipped after it."""
     __tracebackhide__ = True
     result = error = None
     try:
         result = yield
     except (Exception, pytest.skip.Exception, pytest.fail.Exception) as raised:  # noqa: BLE001
         error = raised
-    found = [failure for one in evidence_of(pyfuncitem) for failure in one.failures]
+    found = [failure for one in findings_of(pyfuncitem) for failure in one.failures]
     if found:
         more = verdict.of_text(words_of(error)).failures if error and not isinstance(error, SKIPS) else []
         raise verdict.Found(found + more) from error
@@ -143,11 +143,11 @@ def pytest_runtest_makereport(item, call):
         if isinstance(error, verdict.Found):
             report.longrepr = str(error)
         report.failures, report.claims = getattr(error, "failures", judged.failures), judged.claims
-    evidence = evidence_of(item) if report.when == "call" else []
-    report.claims += [claim for one in evidence for claim in one.claims]
-    report.stalls = [stall for one in evidence for stall in one.stalls]
-    report.figures = [figure for one in evidence for figure in one.figures]
-    report.data = {key: value for one in evidence for key, value in one.data.items()}
+    findings = findings_of(item) if report.when == "call" else []
+    report.claims += [claim for one in findings for claim in one.claims]
+    report.stalls = [stall for one in findings for stall in one.stalls]
+    report.figures = [figure for one in findings for figure in one.figures]
+    report.data = {key: value for one in findings for key, value in one.data.items()}
     return report
 
 
@@ -342,7 +342,7 @@ class Run(verdict.Session):
         """Adds a verdict on something that is not a test."""
         report = report_of(name, (name, 0, name), attempt)
         report.figures = figures
-        self.take(name, self.verdict_of(attempt), attempt._replace(data=[report]))
+        self.count_verdict(name, self.verdict_of(attempt), attempt._replace(data=[report]))
 
 
 def attempts_inside(session):
@@ -408,5 +408,5 @@ def pytest_sessionfinish(session):
 def pytest_unconfigure(config):
     run = config.stash.get(RUN, None)
     if run:
-        kept = [f"kept: {run.folder}"] if config.option.keep else []
-        print(*kept, *run.skipped.values(), run.sums, sep="\n", end="", flush=True)
+        folders = [f"kept: {run.folder}"] if config.option.keep else []
+        print(*folders, *run.skipped.values(), run.sums, sep="\n", end="", flush=True)

@@ -79,7 +79,7 @@ FAULTS = (
         "test_late_on_a_late_machine_is_not_judged",
     ),
     ("pytest's own status wins", "session.exitstatus = MISSING if", "_ = MISSING if", "test_late_on_a_late_machine_is_not_judged"),
-    ("a skipped test has no name", "print(*kept, *run.skipped.values(),", "print(*kept,", "test_late_on_a_late_machine_is_not_judged"),
+    ("a skipped test has no name", "print(*folders, *run.skipped.values(),", "print(*folders,", "test_late_on_a_late_machine_is_not_judged"),
     ("all tests run although some cannot be read", "or session.testsfailed", "", "test_broken_file_is_no_success"),
     ("the long tests always run", 'if os.environ.get("IWHEEL_FULL") != "1" and', "if False and", "test_long_tests"),
     ("the long tests never run", 'os.environ.get("IWHEEL_FULL") != "1"', "True", "test_long_tests"),
@@ -132,7 +132,7 @@ HEAD = """
 
     @pytest.fixture
     def t():
-        return verdict.Evidence()
+        return verdict.Findings()
     """
 
 
@@ -347,7 +347,8 @@ class Inconclusive(Made):
         ran = self.repeated('def test_one():\n    note("tried")\n    assert False, "not within 1 s"\n')
         self.assertIn("real time not judged", ran.lines[-2])
         self.assertEqual("1 inconclusive, counted as skipped: test_it.py::test_one", ran.lines[-3])
-        self.assertEqual("skip: test_it.py::test_one: inconclusive in each of 4 attempts: the machine stalled for up to 500 ms", ran.lines[-4])
+        words = "inconclusive in each of 4 attempts: the machine stalled for up to 500 ms; the last failure: AssertionError: not within 1 s"
+        self.assertEqual(f"skip: test_it.py::test_one: {words}", ran.lines[-4])
 
     def test_late_part_is_not_judged(self):
         self.repeated("""

@@ -52,6 +52,7 @@ FAULTS = (
     ("not judged hides a failure", "return 1 if failed else NOT_JUDGED if unjudged", "return NOT_JUDGED if unjudged else 1 if failed"),
     ("nothing ran is a success", "else 0 if passed else 1", "else 0"),
     ("a sanitizer's report counts as late", "(Address|Leak|", "(Leak|"),
+    ("a name that does not exist counts as late", " or WRONG.search(text)", ""),
     ("a broken rule in a traceback counts as late", "return RULE if re", "return CHECK if re"),
     ("what failed is skipped", "return SKIPPED if attempt.skip else PASSED", "return PASSED"),
     ("the runner's own exception is inconclusive", 'the runner failed: {error!r}", CRASH', 'the runner failed: {error!r}", CHECK'),
@@ -197,7 +198,12 @@ class Inconclusive(unittest.TestCase):
         status, lines, times = made.run()
         self.assertEqual((0, 4), (status, times["one"]))
         self.assertEqual(["1 inconclusive, counted as skipped: one", "3 passed, 0 failed, 1 skipped"], lines)
-        self.assertEqual(("inconclusive", "inconclusive in each of 4 attempts: the machine stalled for up to 123 ms", 4), made.printed["one"])
+        words = "inconclusive in each of 4 attempts: the machine stalled for up to 123 ms; the last failure: it was wrong"
+        self.assertEqual(("inconclusive", words, 4), made.printed["one"])
+
+    def test_gist_of_a_traceback_is_its_error(self):
+        text = "Traceback (most recent call last):\n  File ...\nAssertionError: 3 != 4\niwheel-gateway: info: state: armed\n"
+        self.assertEqual(["AssertionError: 3 != 4", "it was wrong", ""], list(map(verdict.gist, (text, "first\nit was wrong\n", ""))))
 
     def test_others_end_before_it_is_repeated(self):
         made = Made({"one": [bad(verdict.CHECK), ok()], "two": [ok()]}, [stall()])
@@ -257,6 +263,14 @@ class Words(unittest.TestCase):
     def test_kind_of_a_text(self):
         for text in ("==1==ERROR: AddressSanitizer: heap-use-after-free", "a.c:3:1: runtime error: signed integer overflow", "iwheel-gateway ended with -11: "):
             self.assertEqual(verdict.CRASH, self.kind(text))
+        for text in (
+            "NameError: name 'press' is not defined",
+            "playwright._impl._errors.Error: Page.evaluate: ReferenceError: press is not defined",
+            "AttributeError: module 'os' has no attribute 'press'",
+            "TypeError: press() got an unexpected keyword argument 'late'",
+        ):
+            self.assertEqual(verdict.CRASH, self.kind(text), "no stall removes a name")
+        self.assertEqual(verdict.CHECK, self.kind("AttributeError: 'NoneType' object has no attribute 'group'"))
         self.assertEqual(verdict.RULE, self.kind("Traceback\nverdict.RuleBroken: nonzero after e-stop"))
         self.assertEqual(verdict.CHECK, self.kind("AssertionError: not within 10 s: it is armed"))
 

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
+#include <stdbool.h>
 #include <stddef.h>
+#include <stdlib.h>
 
 #include "unit.h"
 
@@ -22,9 +24,12 @@ static const unit_test_t *next(int line) {
     return first;
 }
 
+/// With IWHEEL_FIRST_FAILURE in its environment, the program ends after the first failed test: test/faults and test/mutation need no more.
 int main(void) {
+    const bool only_first = getenv("IWHEEL_FIRST_FAILURE") != NULL;
     UNITY_BEGIN();
-    for (const unit_test_t *test = next(0); test != NULL; test = next(test->line)) {
+    for (const unit_test_t *test = next(0); test != NULL && !(only_first && Unity.TestFailures > 0);
+         test = next(test->line)) {
         Unity.TestFile = test->file;
         UnityDefaultTestRun(test->run, test->name, test->line);
     }

@@ -3,7 +3,8 @@
 
     attempt --no failure-------------------------------------------------------> PASSED
             --RULE: a safety rule was broken-----------------------------------> FAILED, whatever the machine did
-            --CRASH: a program died, a sanitizer reported, no end in time------> FAILED, whatever the machine did
+            --CRASH: a program died, a sanitizer reported, no end in time,
+                     or the test names what does not exist---------------------> FAILED, whatever the machine did
             --TIMING, CHECK: no measured stall is long and near enough---------> FAILED
             --TIMING, CHECK: a measured stall can have caused each of them-----> INCONCLUSIVE
 
@@ -41,6 +42,12 @@ DIED = re.compile(
     r"(Address|Leak|Thread|Memory|UndefinedBehavior)Sanitizer|runtime error: |Segmentation fault|core dumped|Aborted|"
     r"\bended with -(4|6|7|8|11)\b"
 )
+# A stall can make a value None, but it removes no name.
+WRONG = re.compile(
+    r"\b(NameError|UnboundLocalError|ImportError|ModuleNotFoundError|ReferenceError): |\bAttributeError: (?!'NoneType')|"
+    r"\bTypeError: .*(is not a function|unexpected keyword argument|required positional argument)"
+)
+ERROR = re.compile(r"^(?:\w+\.)*\w*(?:Error|Exception)\b.*", re.MULTILINE)  # The last line of a traceback.
 GATEWAY_LATE = re.compile(r"gateway\s+itself\s+was\s+held\s+up\s+for\s+(\d+)\s+ms")
 
 
@@ -85,7 +92,7 @@ class Attempt(NamedTuple):
     data: Any = None  # data of the runner
 
 
-class Evidence:
+class Findings:
     """Findings of a test for its Attempt. `data`: other data for the test's folder."""
 
     def __init__(self):
@@ -98,7 +105,12 @@ def now_us():
 
 def kind_of(text):
     """The kind of a failure with this text: a traceback, or the output of a program."""
-    return RULE if re.search(r"\bRuleBroken\b", text) else CRASH if DIED.search(text) else CHECK
+    return RULE if re.search(r"\bRuleBroken\b", text) else CRASH if DIED.search(text) or WRONG.search(text) else CHECK
+
+
+def gist(text):
+    """The one line of a failure's text that says most."""
+    return (ERROR.findall(text) or text.strip().splitlines() or [""])[-1][:160]
 
 
 def of_text(text, **fields):
@@ -216,11 +228,12 @@ class Session:
         """The longest stall measured during the attempt."""
         return max((late_us for _, late_us in self.measured(attempt, attempt.begin_us, attempt.end_us)), default=0) / 1000
 
-    def take(self, name, verdict, attempt, tries=1):
+    def count_verdict(self, name, verdict, attempt, tries=1):
         """Counts and prints a verdict. An inconclusive test counts as skipped."""
         if verdict == INCONCLUSIVE:
             self.inconclusive.append(name)
-            attempt = attempt._replace(skip=f"inconclusive in each of {tries} attempts: the machine stalled for up to {self.stall_ms(attempt):.0f} ms")
+            words = f"inconclusive in each of {tries} attempts: the machine stalled for up to {self.stall_ms(attempt):.0f} ms"
+            attempt = attempt._replace(skip=f"{words}; the last failure: {gist(attempt.failures[0].text)}")
         elif tries > 1:
             self.repeated.append(name)
         if verdict == FAILED and attempt.failures:
@@ -241,13 +254,13 @@ class Session:
             if verdict == INCONCLUSIVE:
                 undecided.append(name)
             else:
-                self.take(name, verdict, attempt)
+                self.count_verdict(name, verdict, attempt)
 
         with ThreadPoolExecutor(jobs) as pool:
             list(pool.map(first, names))
         for name in undecided:
             verdict, attempt, tries = self.again(name)
-            self.take(name, verdict, attempt, tries + 1)
+            self.count_verdict(name, verdict, attempt, tries + 1)
 
     def end(self):
         """Prints the sums and returns the exit status."""
@@ -303,9 +316,9 @@ def report(name, verdict, attempt, tries):
     print(head + (f"\n{words}" if words else ""), flush=True)
 
 
-def run_all(names, attempt, jobs=1, tell=report):
+def run_all(names, attempt, jobs=1, show=report):
     """Runs all tests of a runner next to a witness. Returns the session; `end` prints the sums."""
-    session = Session(attempt, tell, Witness())
+    session = Session(attempt, show, Witness())
     try:
         session.run(names, jobs)
     finally:

@@ -30,7 +30,7 @@ def realtime_ahead_ns():
 
 
 class Bus:
-    """The stamp is taken by the kernel when the hub hands the frame over, so this process may be slow without harm."""
+    """The kernel sets the stamp when the hub sends the frame, so this process may be slow without harm."""
 
     carries_fd = False
 

@@ -19,7 +19,7 @@ from judge_log import (
     REST_RPM,
     SETTLED_US,
     SPEED_IDS,
-    UNHEARD_US,
+    OFFLINE_US,
     Reading,
     percentile,
     signed,
@@ -230,12 +230,12 @@ class Judge(Reading):
                 self._say("never_sent", session.begin_us, "armed, but no setpoint was sent to a wheel")
                 continue
             until_us = self._must_send_until(session, side)
-            if next_us < self.finished_us or not self._told_silent(session, next_us):
+            if next_us < self.finished_us or not self._reported_silent(session, next_us):
                 until_us = min(until_us, next_us)
             self._no_gap([max(session.armed_us - GAP_US // 2, times[0])] + [t for t in times if t <= until_us] + [until_us])
             self._silence(session, times, next_us)
 
-    def _told_silent(self, session, next_us):
+    def _reported_silent(self, session, next_us):
         """The gateway reported the end, or it has exited: no later setpoint is expected."""
         begin_us = max((at for at, _, _ in session.ends), default=next_us)
         return any(event.kind in ("silent", "exit") and begin_us < event.t_us <= next_us for event in self.events)
@@ -284,20 +284,20 @@ class Judge(Reading):
         """When both wheels have been at standstill for the settling time, at from_us or later. An offline wheel is not at standstill."""
         since = {SPEED_IDS[0]: None, SPEED_IDS[1]: None}
         newest_us = dict(since)
-        # What was before the settling time does not matter: telemetry of a wheel at standstill is back within UNHEARD_US.
-        first = bisect.bisect_left(self._frame_times, from_us - SETTLED_US - 2 * UNHEARD_US)
+        # What was before the settling time does not matter: telemetry of a wheel at standstill is back within OFFLINE_US.
+        first = bisect.bisect_left(self._frame_times, from_us - SETTLED_US - 2 * OFFLINE_US)
         for frame in itertools.islice(self.frames, first, None):
             if frame.id not in since or frame.own or len(frame.data) < 2:
                 continue
             before, newest_us[frame.id] = newest_us[frame.id], frame.t_us
-            if before is not None and frame.t_us - before > UNHEARD_US:
+            if before is not None and frame.t_us - before > OFFLINE_US:
                 since[frame.id] = None
             if abs(signed(frame.data, 0)) > REST_RPM:
                 since[frame.id] = None
             elif since[frame.id] is None:
                 since[frame.id] = frame.t_us
             settled = all(t is not None and frame.t_us - t >= SETTLED_US for t in since.values())
-            if settled and frame.t_us >= from_us and all(frame.t_us - t <= UNHEARD_US for t in newest_us.values()):
+            if settled and frame.t_us >= from_us and all(frame.t_us - t <= OFFLINE_US for t in newest_us.values()):
                 return frame.t_us
         return None
 

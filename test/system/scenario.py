@@ -6,7 +6,7 @@ import unittest
 
 from harness import Rig
 from judge_log import percentile
-from verdict import CHECK, RULE, TIMING, Evidence, Failure
+from verdict import CHECK, RULE, TIMING, Failure, Findings
 
 REGISTRY = {}
 # Refusals of arm that end without an action: the wheels roll out, or the last zero is not on the bus yet.
@@ -40,7 +40,7 @@ def scenario(title, seconds=5, native=""):
     return register
 
 
-class Test(Evidence):
+class Test(Findings):
     """Collects failures as verdict.Failure, figures, and stalls that the test itself has measured."""
 
     __test__ = False  # pytest does not collect tests from it.

@@ -250,7 +250,7 @@ bool bxcan_model_is_on(const bxcan_model_t *self) {
 
 /// 4.2: normal mode begins after 11 recessive bits. 7.6: bus-off ends after 128 times 11, if software has begun the
 /// recovery.
-static void look_for_idle(bxcan_model_t *self) {
+static void check_idle(bxcan_model_t *self) {
     if (self->joining) {
         self->joining = false;
         self->msr &= ~(MSR_INAK | MSR_SLAK);
@@ -273,7 +273,7 @@ void bxcan_model_recessive(bxcan_model_t *self, uint32_t bits) {
     for (; bits > 0U; bits--) {
         if (++self->recessive_bits >= 11U) {
             self->recessive_bits = 0;
-            look_for_idle(self);
+            check_idle(self);
         }
     }
 }

@@ -7,6 +7,7 @@ import random
 from pathlib import Path
 
 import beginnings
+import unicorn
 from emulator.can import LEFT
 from emulator.chip import MS, PINRSTF, US
 from host import Host, framed
@@ -84,6 +85,7 @@ def both_words_and_turns(rig):
     host = start(rig)
     assert host.ask(1, {"cmd": "nonsense"})["error"] == "unknown_cmd"
     assert host.ask(1, {"cmd": "arm", "speed": 1})["error"] == "unknown_field"
+    assert host.ask(1, {"cmd": "stop", "speed": 1})["ok"], "a stop was refused for a field"
     assert host.ask(1, {"cmd": "recordings"})["error"] == "denied"
     host.ask(1, {"cmd": "watch", "topics": ["state"]})
     assert host.ask(1, {"cmd": "confirm", "item": "wheel_radius", "value": 194})["state"] == "confirmed"
@@ -201,7 +203,7 @@ def stale_in_every_way(rig):
     assert not moving(rig, last_ns + LEASE_NS + PERIOD_NS + RAMP_NS)
 
 
-def nobody_feeds_another(rig):
+def each_client_feeds_itself(rig):
     """The board refuses the good commands of a second client, and they do not extend the lease of the first one."""
     host = start_driving(rig)
     host.open(2)
@@ -436,7 +438,7 @@ def power_cut_while_writing(rig):
         boots.add(host.boot)
         value += 1
         host.ask(1, {"cmd": "config", "key": "drive.lease_ms", "value": value})
-        rig.machine.flash.cut_after = cut
+        rig.machine.flash.cut_after, rig.machine.flash.eccr_lost = cut, cut % 2
         host.say(1, {"cmd": "config", "commit": True})
         rig.run(100 * MS)
         if rig.machine.flash.cut_after is not None:  # The commit was complete before.
@@ -498,11 +500,11 @@ def stored_in_flash(rig):
     host.begin_again()
     rig.run(600 * MS)
     status = host.ask(1, {"cmd": "status"})
-    left, ledger = status["left"], status["ledger"]
+    left, assumptions = status["left"], status["ledger"]
     assert status["memory"]["state"] == "kept"
     assert (left["offset_provenance"], left["offset_origin"], left["force_offset_mN"], left["offset_samples"]) == ("stored", "operator", tared, 40), left
-    assert ledger["wheel_radius"] == {"state": "confirmed", "evidence": "operator"}, ledger["wheel_radius"]
-    assert ledger["dlc"]["state"] == "confirmed" and ledger["dlc"]["evidence"] == "bus"
+    assert assumptions["wheel_radius"] == {"state": "confirmed", "evidence": "operator"}, assumptions["wheel_radius"]
+    assert assumptions["dlc"]["state"] == "confirmed" and assumptions["dlc"]["evidence"] == "bus"
     host.ask(1, {"cmd": "config", "key": "wheels.radius_mm", "value": 180})
     assert host.ask(1, {"cmd": "config", "commit": True})["restarts"]
     host.begin_again()
@@ -575,6 +577,32 @@ def fault_is_reported(rig):
     host.begin_again()
     assert fault_of(host) is None, "an old fault is reported for ever"
     rig.expect_resets("software", "software", "power", "power")
+
+
+def program_unreadable(rig):
+    """In motion the flash reports that it cannot correct a word of the program: zeros first, and the next start reports the NMI."""
+    host, machine = start_driving(rig), rig.machine
+    machine.flash.report(1 << 31)
+    failed_ns = machine.now_ns
+    host.begin_again()
+    zeros = rig.setpoints(failed_ns)
+    assert zeros[0].time_ns - failed_ns < 50 * MS and not moving(rig, failed_ns), "no zeros first"
+    assert fault_of(host)[0] >> 26 == 2, fault_of(host)
+    rig.expect_resets("software")
+
+
+def reads_the_ram_first(rig):
+    """After a reset the image reads the RAM before it writes a variable, because a G474 can lose the first write."""
+    machine, accesses = rig.machine, []
+    machine.reset("pin", PINRSTF)
+    machine.cpu.ctl_flush_tb()  # Code that was translated without the hook does not call it.
+    kinds = unicorn.UC_HOOK_MEM_READ | unicorn.UC_HOOK_MEM_WRITE
+    end = 0x20000000 + machine.board.ram_size - 1
+    hook = machine.cpu.hook_add(kinds, lambda cpu, kind, *rest: accesses.append(kind), begin=rig.stack_area[1], end=end)
+    rig.run(20 * US)
+    machine.cpu.hook_del(hook)
+    assert accesses and accesses[0] == unicorn.UC_MEM_READ, "the first access to the RAM is a write"
+    rig.expect_resets("pin")
 
 
 def bus_off_driven(rig):
@@ -740,7 +768,7 @@ SCENARIOS = (
     relay_killed_and_anew,
     relay_stopped_goes_on,
     stale_in_every_way,
-    nobody_feeds_another,
+    each_client_feeds_itself,
     estop_random,
     estop_in_floods,
     software_estop,
@@ -757,4 +785,5 @@ SCENARIOS = (
     dma_errors,
     crowd,
 )
-LONG = (both_words_and_turns, estop_random, estop_in_floods, hostile_line, crowd, reset_in_motion, nobody_feeds_another, power_cut_while_learning)
+OF_G474 = (program_unreadable, reads_the_ram_first)
+LONG = (both_words_and_turns, estop_random, estop_in_floods, hostile_line, crowd, reset_in_motion, each_client_feeds_itself, power_cut_while_learning)

@@ -62,7 +62,7 @@ static brd_assumptions_t something(void) {
     iw_gateway_set_assumption(&rig.gateway, IW_ASSUMPTION_GEAR_RATIO, &said);
     iw_gateway_set_assumption(&rig.gateway, IW_ASSUMPTION_DLC, &said);
     iw_gateway_set_assumption(&rig.gateway, IW_ASSUMPTION_FORCE_UNIT_RIGHT, &seen);
-    const iw_snapshot_t now = gateway_rig_look(&rig);
+    const iw_snapshot_t now = gateway_rig_snapshot(&rig);
     brd_assumptions_note(&learned, &now, &settings, zero);
     return learned;
 }
@@ -72,7 +72,7 @@ static iw_snapshot_t run_again(const brd_assumptions_t *learned, const brd_setti
                                brd_assumptions_zero_t zero[IW_SIDES]) {
     gateway_rig_begin(&rig, false);
     brd_assumptions_restore(learned, settings, &rig.gateway, zero);
-    return gateway_rig_look(&rig);
+    return gateway_rig_snapshot(&rig);
 }
 
 TEST(test_learned_with_same_settings_is_restored_with_its_source) {

@@ -132,7 +132,7 @@ TEST(test_received_frame_with_a_slow_release_is_not_doubled) {
 }
 #endif
 
-static void assert_loss_is_told(void) {
+static void assert_loss_reported(void) {
     iw_can_frame_t received;
     memset(&received, 0xA5, sizeof received);
     TEST_ASSERT_EQUAL(1, can_receive(driver, &received));
@@ -161,7 +161,7 @@ TEST(test_overrun_is_reported_once_and_before_its_frames) {
     iw_can_frame_t received;
     for (int round = 0; round < 2; round++) {
         overrun();
-        assert_loss_is_told();
+        assert_loss_reported();
         for (int i = 0; i < 3; i++) {
             TEST_ASSERT_EQUAL(1, can_receive(driver, &received));
             TEST_ASSERT_EQUAL(256, received.id);
@@ -178,7 +178,7 @@ TEST(test_full_ring_drops_and_counts_the_newest) {
         rig_serve(0);
     }
     TEST_ASSERT_EQUAL(5, driver->lost);
-    assert_loss_is_told();
+    assert_loss_reported();
     for (uint32_t i = 0; i < BRD_FRAME_RING_LENGTH; i++) {
         TEST_ASSERT_EQUAL(1, can_receive(driver, &received));
         TEST_ASSERT_EQUAL(i, received.data[0]);

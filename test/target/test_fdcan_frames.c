@@ -83,18 +83,14 @@ TEST(test_silent_device_is_in_bus_monitoring_mode) {
     TEST_ASSERT_EQUAL_HEX32(BRD_CCCR_MON, can_model_read(model, 0x18));
 }
 
-/// TXBTO is that of the frame before until the new one is requested.
-static bool complete_right_at_masking(uint32_t offset) {
-    if (offset != RIG_MASK_REGISTER || !RIG_IS_PENDING(model, 1)) {
-        return true;
-    }
+static void complete_right(void) {
     can_model_begin(model, 1);
     can_model_end(model, 1, MODEL_SENT);
-    return false;
 }
 
-TEST(test_loaded_buffer_that_is_not_requested_has_no_echo) {
-    const iw_can_frame_t pair[] = {rig_frame(266, 3), rig_frame(299, 4)};
+/// A left frame was sent from buffer 0, and a right frame waits in buffer 1. TXBTO is that of the frame before until the
+/// new one is requested.
+static void send_left_and_load_right(void) {
     model_frame_t on_bus;
     iw_can_frame_t echo;
     TEST_ASSERT_EQUAL(1, send(266, 1));
@@ -103,16 +99,55 @@ TEST(test_loaded_buffer_that_is_not_requested_has_no_echo) {
     model->put = 1;
     TEST_ASSERT_EQUAL(1, send(298, 2));
     model->put = 0;
-    rig[0].on_read = complete_right_at_masking;
-    TEST_ASSERT_EQUAL(2, can_send(driver, pair, 2));
-    rig[0].on_read = NULL;
+}
+
+/// The right frame was sent. The new left one has no echo before it is sent too.
+static void assert_left_is_not_sent_yet(uint8_t mark) {
+    model_frame_t on_bus;
+    iw_can_frame_t echo;
     TEST_ASSERT_EQUAL(1, can_receive(driver, &echo));
     TEST_ASSERT_EQUAL(298, echo.id);
     TEST_ASSERT_EQUAL(0, can_receive(driver, &echo));
     TEST_ASSERT_TRUE(rig_send_next(0, &on_bus));
     TEST_ASSERT_EQUAL(266, on_bus.id);
     TEST_ASSERT_EQUAL(1, can_receive(driver, &echo));
-    TEST_ASSERT_EQUAL(3, echo.data[0]);
+    TEST_ASSERT_EQUAL(266, echo.id);
+    TEST_ASSERT_EQUAL(mark, echo.data[0]);
+}
+
+static bool complete_right_at_masking(uint32_t offset) {
+    if (offset != RIG_MASK_REGISTER || !RIG_IS_PENDING(model, 1)) {
+        return true;
+    }
+    complete_right();
+    return false;
+}
+
+TEST(test_loaded_buffer_that_is_not_requested_has_no_echo) {
+    const iw_can_frame_t pair[] = {rig_frame(266, 3), rig_frame(299, 4)};
+    send_left_and_load_right();
+    rig[0].on_read = complete_right_at_masking;
+    TEST_ASSERT_EQUAL(2, can_send(driver, pair, 2));
+    rig[0].on_read = NULL;
+    assert_left_is_not_sent_yet(3);
+}
+
+static unsigned masks; ///< Writes of the mask until the hook acts.
+
+static void complete_right_at_request(uint32_t offset) {
+    if (offset == RIG_MASK_REGISTER && --masks == 0U) {
+        rig[0].on_write = NULL;
+        complete_right();
+    }
+}
+
+TEST(test_completion_of_another_buffer_at_the_request_gives_no_echo) {
+    send_left_and_load_right();
+    masks = 3; // Masked and unmasked for the buffer, and masked for the request.
+    rig[0].on_write = complete_right_at_request;
+    TEST_ASSERT_EQUAL(1, send(266, 2));
+    TEST_ASSERT_EQUAL(0, masks);
+    assert_left_is_not_sent_yet(2);
 }
 
 static uint32_t requests;

@@ -20,7 +20,7 @@ TEST(test_channel_opened_again_has_no_lease) {
     say(0, "{\"cmd\":\"open\",\"channel\":1,\"watch\":false}");
     run_ms(20);
     TEST_ASSERT_NOT_EQUAL_UINT(before, host.client[0].served.id);
-    TEST_ASSERT_EQUAL_UINT(IW_CLIENT_NONE, gateway_rig_look(&rig).holder);
+    TEST_ASSERT_EQUAL_UINT(IW_CLIENT_NONE, gateway_rig_snapshot(&rig).holder);
     TEST_ASSERT_NOT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
     assert_answer("{\"cmd\":\"hello\",\"id\":3}", "\"name\":\"iwheel-gateway\"");
 }
@@ -136,7 +136,7 @@ static void ask_for_status(unsigned first, unsigned count) {
     }
 }
 
-static void assert_told(const char *part) {
+static void assert_reported(const char *part) {
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(all, part), part);
 }
 
@@ -152,9 +152,9 @@ TEST(test_pending_replies_leave_a_place_for_an_arm) {
     run_ms(120);
     for (unsigned channel = 1; channel <= IWN_LINE_CHANNELS; channel++) {
         (void)snprintf(part, sizeof part, "\"id\":%u,\"ok\":true", 100U + channel);
-        assert_told(part);
+        assert_reported(part);
     }
-    assert_told("\"id\":99,\"ok\":true");
+    assert_reported("\"id\":99,\"ok\":true");
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
 }
 
@@ -164,9 +164,9 @@ TEST(test_pending_reply_of_a_closed_channel_frees_its_place) {
     say(0, "{\"cmd\":\"close\",\"channel\":3}");
     say(1, "{\"cmd\":\"status\",\"id\":7}");
     run_ms(60);
-    assert_told("\"id\":102,\"ok\":true");
-    assert_told("\"id\":104,\"ok\":true");
-    assert_told("\"id\":7,\"ok\":true");
+    assert_reported("\"id\":102,\"ok\":true");
+    assert_reported("\"id\":104,\"ok\":true");
+    assert_reported("\"id\":7,\"ok\":true");
     TEST_ASSERT_NULL(strstr(all, "\"id\":103"));
 }
 

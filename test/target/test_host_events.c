@@ -42,7 +42,7 @@ TEST(test_host_reports_estop_and_each_cause_by_name_once) {
     pass(200);
     TEST_ASSERT_EQUAL_UINT(1, count_of("\"event\":\"estop\",\"t_us\""));
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(all, "\"state\":\"pressed\"}"), all);
-    iw_snapshot_t seen = gateway_rig_look(&rig);
+    iw_snapshot_t seen = gateway_rig_snapshot(&rig);
     seen.still_moving++;
     seen.present |= 1U << IW_CAUSE_ESTOP_LINE;
     brd_host_observe(&host, &seen);
@@ -84,7 +84,7 @@ TEST(test_host_reports_a_stop_with_its_cause_and_client) {
 TEST(test_host_zero_of_each_wheel_is_reported_once_per_change) {
     disarm();
     watch_everything();
-    iw_snapshot_t seen = gateway_rig_look(&rig);
+    iw_snapshot_t seen = gateway_rig_snapshot(&rig);
     iw_force_t force = *seen.wheel[IW_RIGHT].force;
     force.provenance = IW_OFFSET_STORED;
     force.offset_mN = 1234;
@@ -102,10 +102,12 @@ TEST(test_host_zero_of_each_wheel_is_reported_once_per_change) {
     brd_host_observe(&host, &seen);
     TEST_ASSERT_EQUAL_UINT(1, count_of("\"event\":\"offset\""));
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(all, "\"before_mN\":1234,"), all);
+    host.reported.offset_us[IW_LEFT] = IW_NEVER;
     force.offset_us = 100;
     force.offset_mN = 55;
     brd_host_observe(&host, &seen);
     TEST_ASSERT_EQUAL_UINT(2, count_of("\"event\":\"offset\""));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(all, "\"before_provenance\":\"operator\""), all);
     force.provenance = IW_OFFSET_ESTIMATED;
     force.quality.deviation_mN = 31;
     brd_host_observe(&host, &seen);
@@ -143,12 +145,12 @@ TEST(test_host_stores_learned_values_once_and_restores_them) {
     pass(5000);
     TEST_ASSERT_EQUAL_UINT32_MESSAGE(writes, flash_writes, "the flash wears");
     start();
-    state = iwn_server_look(&host.server)->assumed[IW_ASSUMPTION_TRACK].state;
+    state = iwn_server_snapshot(&host.server)->assumed[IW_ASSUMPTION_TRACK].state;
     TEST_ASSERT_EQUAL_INT(IW_CONFIRMED, state);
     TEST_ASSERT_EQUAL_INT(BRD_RECORDS_STORED, host.records);
     has_flash = false;
     start();
-    state = iwn_server_look(&host.server)->assumed[IW_ASSUMPTION_TRACK].state;
+    state = iwn_server_snapshot(&host.server)->assumed[IW_ASSUMPTION_TRACK].state;
     TEST_ASSERT_EQUAL_INT(IW_ASSUMED, state);
     TEST_ASSERT_EQUAL_INT(BRD_RECORDS_NEW, host.records);
     flash_fails = true;
@@ -261,6 +263,30 @@ TEST(test_host_executes_relay_commands_and_counts_errors) {
     TEST_ASSERT_EQUAL_UINT32(2U + sizeof bad / sizeof bad[0] - 1U, host.errors);
 }
 
+TEST(test_host_line_errors_are_counted_once) {
+    for (unsigned i = 0; i < 3U; i++) {
+        put("rubbish*00000000\n", 17);
+    }
+    pass(1000);
+    TEST_ASSERT_EQUAL_UINT32(1, errors);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(all, "\"count\":3}"), all);
+    put("rubbish*00000000\n", 17);
+    pass(1000);
+    TEST_ASSERT_EQUAL_UINT32(2, errors);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(all, "\"count\":1}"), all);
+}
+
+TEST(test_host_lost_events_are_reported_once) {
+    watch_everything();
+    serial_room = BRD_HOST_REPLY_ROOM;
+    estop_high = true;
+    pass(100);
+    TEST_ASSERT_EQUAL_UINT(0, count_of("\"event\":\"estop\""));
+    serial_room = BRD_SERIAL_SEND_BYTES;
+    pass(500);
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(1, count_of("\"event\":\"lost\""), all);
+}
+
 TEST(test_host_client_closed_or_offline_for_500_ms_is_removed) {
     watch_everything();
     say(0, "{\"cmd\":\"open\",\"channel\":2,\"watch\":true}");
@@ -284,7 +310,7 @@ TEST(test_host_client_closed_or_offline_for_500_ms_is_removed) {
 TEST(test_host_status_has_the_estop_and_the_zero_of_each_wheel) {
     host.zero[IW_LEFT] = (brd_assumptions_zero_t){.from = IW_OFFSET_OPERATOR, .deviation_mN = 11};
     host.zero[IW_RIGHT] = (brd_assumptions_zero_t){.from = IW_OFFSET_ESTIMATED, .deviation_mN = 22};
-    const iwn_surroundings_t around = iwn_target_around(&host.server, iwn_server_look(&host.server));
+    const iwn_surroundings_t around = iwn_target_around(&host.server, iwn_server_snapshot(&host.server));
     TEST_ASSERT_TRUE(around.estop.present);
     TEST_ASSERT_EQUAL_UINT32(11, around.zero[IW_LEFT].deviation_mN);
     TEST_ASSERT_EQUAL_UINT32(22, around.zero[IW_RIGHT].deviation_mN);
@@ -323,7 +349,7 @@ TEST(test_host_line_is_stamped_every_second_while_disarmed) {
     forget();
     pass(3000);
     TEST_ASSERT_EQUAL_UINT(3, count_of("\"event\":\"link\""));
-    const iw_snapshot_t seen = gateway_rig_look(&rig);
+    const iw_snapshot_t seen = gateway_rig_snapshot(&rig);
     TEST_ASSERT_EQUAL_UINT64(host.linked_us + 1000000U, brd_host_report(&host, &seen, false));
 }
 

@@ -54,7 +54,7 @@ TEST(test_host_tare_is_stored_for_its_wheel_only) {
     rig.gateway.force[IW_LEFT].offset_mN = 11;
     rig.gateway.force[IW_RIGHT].offset_mN = 22;
     rig.gateway.force[IW_RIGHT].provenance = IW_OFFSET_OPERATOR;
-    (void)iwn_server_look(&host.server);
+    (void)iwn_server_snapshot(&host.server);
     iwn_target_tared(&host.server, &host.client[0].served, IW_RIGHT, &window);
     TEST_ASSERT_EQUAL_UINT8(IW_OFFSET_OPERATOR, host.zero[IW_RIGHT].from);
     TEST_ASSERT_EQUAL_INT32(22, host.zero[IW_RIGHT].offset_mN);
@@ -130,7 +130,7 @@ TEST(test_host_reports_the_button_and_returns_the_next_event_time) {
     disarm();
     say(1, "{\"cmd\":\"watch\",\"topics\":[\"state\"],\"rate_hz\":10}");
     run_ms(20);
-    const iw_snapshot_t seen = gateway_rig_look(&rig);
+    const iw_snapshot_t seen = gateway_rig_snapshot(&rig);
     const iw_time_us_t next_us = brd_host_report(&host, &seen, true);
     TEST_ASSERT_EQUAL_INT(1, host.server.reported.estop);
     TEST_ASSERT_EQUAL_UINT64(host.client[0].served.next_us, next_us);
@@ -147,7 +147,7 @@ TEST(test_host_change_of_assumptions_is_reported_and_stored) {
     brd_assumptions_t now;
     memset(&now, 0, sizeof now);
     iw_assumption_entry_t entry[IW_ASSUMPTION_ITEMS];
-    iw_snapshot_t seen = gateway_rig_look(&rig);
+    iw_snapshot_t seen = gateway_rig_snapshot(&rig);
     seen.assumed = entry;
     for (unsigned item = 0; item < IW_ASSUMPTION_ITEMS; item++) {
         entry[item] = (iw_assumption_entry_t){IW_CONFIRMED, IW_SOURCE_OPERATOR, 0};

@@ -95,7 +95,7 @@ TEST(test_host_item_change_is_reported) {
 TEST(test_host_link_line_is_sent_exactly_after_a_second) {
     ask("{\"cmd\":\"stop\",\"id\":1}", "\"ok\":true");
     pass(2500);
-    iw_snapshot_t seen = gateway_rig_look(&rig);
+    iw_snapshot_t seen = gateway_rig_snapshot(&rig);
     forget();
     seen.at_us = host.linked_us + BRD_HOST_LINK_US - 1U;
     (void)brd_host_report(&host, &seen, false);
@@ -122,7 +122,7 @@ TEST(test_host_tare_of_one_wheel_sets_its_zero_only) {
     ask("{\"cmd\":\"tare\",\"id\":2,\"side\":\"left\"}", "\"left\":{");
     TEST_ASSERT_EQUAL_UINT8(IW_OFFSET_OPERATOR, host.zero[IW_LEFT].from);
     TEST_ASSERT_EQUAL_UINT8(IW_OFFSET_NONE, host.zero[IW_RIGHT].from);
-    const iw_snapshot_t seen = gateway_rig_look(&rig);
+    const iw_snapshot_t seen = gateway_rig_snapshot(&rig);
     const iwn_surroundings_t around = iwn_target_around(&host.server, &seen);
     TEST_ASSERT_EQUAL_UINT32(IW_FORCE_WINDOW_SAMPLES, around.zero[IW_LEFT].samples);
     TEST_ASSERT_EQUAL_UINT32(0, around.zero[IW_RIGHT].samples);
@@ -130,7 +130,7 @@ TEST(test_host_tare_of_one_wheel_sets_its_zero_only) {
 
 TEST(test_host_first_item_is_stored) {
     ask("{\"cmd\":\"confirm\",\"id\":1,\"item\":\"setpoint_type\"}", "\"state\":\"confirmed\"");
-    const iw_snapshot_t seen = gateway_rig_look(&rig);
+    const iw_snapshot_t seen = gateway_rig_snapshot(&rig);
     brd_assumptions_t learned;
     brd_assumptions_note(&learned, &seen, &host.settings, host.zero);
     TEST_ASSERT_EQUAL_UINT8(IW_CONFIRMED, learned.item[IW_ASSUMPTION_SETPOINT_TYPE] & 0x0FU);
@@ -140,7 +140,7 @@ TEST(test_host_counts_only_its_channels) {
     memset(&host.pending, 0xFF, sizeof host.pending);
     memset(&host.receiver, 0xFF, sizeof host.receiver);
     memset(host.in, 0xFF, sizeof host.in);
-    const iw_snapshot_t seen = gateway_rig_look(&rig);
+    const iw_snapshot_t seen = gateway_rig_snapshot(&rig);
     TEST_ASSERT_EQUAL_UINT32(1, iwn_target_around(&host.server, &seen).clients);
 }
 

@@ -44,14 +44,14 @@ def begun(board, image, oscillator, beginning):
 
 
 @pytest.fixture
-def evidence():
-    return verdict.Evidence()
+def findings():
+    return verdict.Findings()
 
 
 @pytest.mark.parametrize(("board", "image", "oscillator", "beginning", "scenario"), [*cases()])
-def test_scenario(board, image, oscillator, beginning, scenario, evidence):
+def test_scenario(board, image, oscillator, beginning, scenario, findings):
     error, notes = beginnings.apart(emulate.judge, begun(board, image, oscillator, beginning), scenario) or ("it ended without a verdict", [])
-    evidence.figures += notes
+    findings.figures += notes
     assert not error, error
 
 
@@ -64,3 +64,18 @@ def test_elf_bin_and_hex_hold_the_same(board, tmp_path):
     assert (tmp_path / "back").read_bytes() == binary.read_bytes()
     assert re.search(r"^:02000004(\w{4})", text.read_text(), re.MULTILINE)[1] == "0800", "the flash's first address"
     assert int.from_bytes(binary.read_bytes()[:4], "little") == 0x20000700, "the top of the stack"
+
+
+@pytest.mark.parametrize("board", [*CPUS])
+def test_handlers_wait_for_their_writes(board):
+    """ES0430 2.1.3: a barrier in each interrupt handler, or in the function in which it ends. No emulator shows the fault that it prevents."""
+    code = must(["arm-none-eabi-objdump", "-d", "--no-show-raw-insn", WORK / f"images/{board}-gateway.elf"])
+    functions = dict(re.findall(r"^\w{8} <(\w+)>:\n(.*?)(?=\n\n|\Z)", code, re.MULTILINE | re.DOTALL))
+
+    def waits(name):
+        ends_in = re.findall(r"\tb(?:\.[nw])?\t\w+ <(brd_\w+)>", functions[name])
+        return "\tdsb" in functions[name] or any(waits(other) for other in ends_in if other != name)
+
+    handlers = {name for name in functions if re.fullmatch(r"brd_\w+_handler", name)} - {"brd_reset_handler", "brd_nmi_handler"}
+    assert len(handlers) >= 6, handlers
+    assert all(map(waits, handlers)), [name for name in sorted(handlers) if not waits(name)]

@@ -72,7 +72,7 @@ def test_bus_clock_does_not_compile_and_the_message_helps(mhz, tmp_path):
 
 
 def check_source(board, source, *options):
-    """Compiles a file of the board without keeping the result."""
+    """Checks a file of the board with the compiler, without output."""
     flags = [f"-mcpu={CPUS[board]}", "-mthumb", "-std=c11", "-fsyntax-only", *options]
     folders = [ROOT / "core/include", STM32, STM32 / "access", STM32 / "boards" / board]
     return run(["arm-none-eabi-gcc", *flags, *(f"-I{folder}" for folder in folders), STM32 / source])

@@ -15,7 +15,7 @@ void setUp(void) {
 }
 
 static void assert_entry(iw_assumption_item_t item, iw_assumption_state_t state, iw_source_t source, int32_t figure) {
-    const iw_assumption_entry_t *entry = iw_assumption_entry(&assumptions, item);
+    const iw_assumption_entry_t *entry = &assumptions.entry[item];
     TEST_ASSERT_EQUAL_INT(state, entry->state);
     TEST_ASSERT_EQUAL_INT(source, entry->source);
     TEST_ASSERT_EQUAL_INT32(figure, entry->figure);
@@ -32,8 +32,8 @@ TEST(test_assumption_init_sets_assumed_and_the_document_source) {
         assert_entry((iw_assumption_item_t)item, IW_ASSUMED, origin[item], 0);
     }
     // The table of the document shows the lengths, but no sentence states them: both sources are correct.
-    TEST_ASSERT_EQUAL_INT(IW_ASSUMED, iw_assumption_entry(&assumptions, IW_ASSUMPTION_DLC)->state);
-    TEST_ASSERT_EQUAL_INT32(0, iw_assumption_entry(&assumptions, IW_ASSUMPTION_DLC)->figure);
+    TEST_ASSERT_EQUAL_INT(IW_ASSUMED, assumptions.entry[IW_ASSUMPTION_DLC].state);
+    TEST_ASSERT_EQUAL_INT32(0, assumptions.entry[IW_ASSUMPTION_DLC].figure);
     TEST_ASSERT_EQUAL_UINT32(0, assumptions.changes);
     TEST_ASSERT_EQUAL_INT(IW_ASSUMPTION_ITEMS, assumptions.doubt);
 }
@@ -163,7 +163,7 @@ static void walk(uint32_t path, unsigned length) {
         const iw_assumption_entry_t before = expected;
         expected = model(expected, operation, figure);
         apply(operation, figure);
-        if (differs(&expected, iw_assumption_entry(&assumptions, IW_ASSUMPTION_GEAR_RATIO))) {
+        if (differs(&expected, &assumptions.entry[IW_ASSUMPTION_GEAR_RATIO])) {
             assert_entry(IW_ASSUMPTION_GEAR_RATIO, expected.state, expected.source, expected.figure);
         }
         if ((assumptions.changes > changes) != differs(&before, &expected)) {

@@ -7,6 +7,9 @@
 
 #include <stdio.h>
 #include <string.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
 
 #define MS 1000U
 
@@ -139,17 +142,21 @@ TEST(test_forgotten_question_is_not_sent) {
     TEST_ASSERT_EQUAL(0, answered + refused);
 }
 
-TEST(test_stop_never_waits_for_questions) {
-    connect_both();
-    for (unsigned i = 0; i < BRIDGE_ASKED_MAX; i++) {
-        TEST_ASSERT_TRUE(bridge_link_ask(&link_, "{\"cmd\":\"status\"}", take_answer, NULL, now_us));
-    }
+static void assert_stop_is_sent_at_once(void) {
     TEST_ASSERT_TRUE(bridge_link_ask(&link_, "{\"cmd\":\"stop\"}", take_answer, NULL, now_us));
     TEST_ASSERT_TRUE(fake_gateway_read(&gateway, STOPS, line, sizeof line)); // No further step is needed.
     TEST_ASSERT_NOT_NULL(strstr(line, "\"cmd\":\"stop\""));
     fake_gateway_reply(&gateway, STOPS, line, true, "");
     step();
     TEST_ASSERT_EQUAL(1, answered);
+}
+
+TEST(test_stop_never_waits_for_questions) {
+    connect_both();
+    for (unsigned i = 0; i < BRIDGE_ASKED_MAX; i++) {
+        TEST_ASSERT_TRUE(bridge_link_ask(&link_, "{\"cmd\":\"status\"}", take_answer, NULL, now_us));
+    }
+    assert_stop_is_sent_at_once();
 }
 
 TEST(test_stop_never_queues_behind_stops) {
@@ -225,19 +232,59 @@ TEST(test_link_gateway_without_greeting_times_out) {
     TEST_ASSERT_GREATER_THAN_UINT64(now_us, bridge_link_next_us(&link_, now_us));
 }
 
+static int knock(void) {
+    struct sockaddr_un address = {.sun_family = AF_UNIX};
+    (void)snprintf(address.sun_path, sizeof address.sun_path, "%s", gateway.path);
+    const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0);
+    if (connect(fd, (const struct sockaddr *)&address, sizeof address) != 0) {
+        (void)close(fd);
+        return -1;
+    }
+    return fd;
+}
+
+/// The gateway accepts no connection until after the time of the stop.
 TEST(test_stop_after_timeout_is_not_sent_late) {
-    gateway.greets = false;
-    step();
-    step();
+    int others[FAKE_CONNECTIONS];
+    int count = 0;
+    connect_both();
+    fake_gateway_hang_up(&gateway, STOPS);
+    (void)bridge_link_step(&link_, now_us);
+    while ((others[count] = knock()) >= 0) {
+        count++;
+        TEST_ASSERT_LESS_THAN(FAKE_CONNECTIONS - 4, count);
+    }
     TEST_ASSERT_TRUE(bridge_link_ask(&link_, "{\"cmd\":\"stop\"}", take_answer, NULL, now_us));
     now_us += BRIDGE_STOP_US;
-    step();
+    (void)bridge_link_step(&link_, now_us);
     TEST_ASSERT_EQUAL(1, refused);
-    fake_gateway_send(&gateway, STOPS, "{\"event\":\"hello\",\"api\":1,\"client\":1,\"rights\":\"drive\"}");
+    fake_gateway_accept(&gateway);
+    now_us += 3000U * MS;
     step();
     step();
     TEST_ASSERT_EQUAL(BRIDGE_HERE, link_.stop.line.state);
-    TEST_ASSERT_EQUAL(0, read_all(STOPS));
+    TEST_ASSERT_EQUAL(0, read_all(gateway.count - 1));
+    while (count > 0) {
+        (void)close(others[--count]);
+    }
+}
+
+/// All places of the gateway are in use: it sends no greeting, executes one stop, and closes a connection without one.
+TEST(test_stop_needs_no_greeting) {
+    gateway.greets = false;
+    step();
+    step();
+    assert_stop_is_sent_at_once();
+    fake_gateway_send(&gateway, STOPS,
+                      "{\"id\":null,\"ok\":false,\"error\":\"too_many_clients\",\"message\":\"full\"}");
+    fake_gateway_hang_up(&gateway, STOPS);
+    step();
+    const int next = gateway.count;
+    TEST_ASSERT_TRUE(bridge_link_ask(&link_, "{\"cmd\":\"estop\"}", take_answer, NULL, now_us));
+    fake_gateway_accept(&gateway);
+    TEST_ASSERT_TRUE(fake_gateway_read(&gateway, next, line, sizeof line)); // On a new connection, also without a step.
+    TEST_ASSERT_NOT_NULL(strstr(line, "\"cmd\":\"estop\""));
+    TEST_ASSERT_EQUAL(0, refused);
 }
 
 TEST(test_link_full_gateway_is_retried_with_pauses) {
@@ -255,6 +302,56 @@ TEST(test_link_full_gateway_is_retried_with_pauses) {
     }
     TEST_ASSERT_LESS_OR_EQUAL(6, gateway.count);
     TEST_ASSERT_EQUAL(0, here);
+}
+
+static void hear(long long t_us) {
+    char event[64];
+    (void)snprintf(event, sizeof event, "{\"event\":\"state\",\"t_us\":%lld}", t_us);
+    fake_gateway_send(&gateway, WATCHES, event);
+    step();
+}
+
+/// A board whose clock began an hour later, and runs 100 ppm slower.
+TEST(test_link_clock_is_that_of_the_fastest_event) {
+    const long long hour_us = 3600LL * 1000000;
+    const long long first_us = (long long)now_us;
+    now_us += (uint64_t)hour_us;
+    connect_both();
+    TEST_ASSERT_EQUAL_INT64(0, bridge_link_ahead_us(&link_, now_us));
+    now_us += 40U * MS;
+    hear(first_us);
+    TEST_ASSERT_EQUAL_INT64(-hour_us - 40000, bridge_link_ahead_us(&link_, now_us));
+    now_us += 100U * MS;
+    hear(first_us + 135000); // 5 ms on the way.
+    TEST_ASSERT_EQUAL_INT64(-hour_us - 5000, bridge_link_ahead_us(&link_, now_us));
+    now_us += 2000U * MS;
+    hear(first_us + 200000); // Late by more than a second: the clock stays, but for its drift.
+    TEST_ASSERT_EQUAL_INT64(-hour_us - 5400, bridge_link_ahead_us(&link_, now_us));
+    for (int i = 0; i < 100; i++) {
+        now_us += 1000U * MS;
+        hear(first_us + 2140000 + (i + 1) * 999900LL);
+    }
+    TEST_ASSERT_INT64_WITHIN(300, -hour_us - 10000, bridge_link_ahead_us(&link_, now_us));
+    fake_gateway_hang_up(&gateway, WATCHES);
+    step();
+    TEST_ASSERT_EQUAL_INT64(0, bridge_link_ahead_us(&link_, now_us));
+}
+
+TEST(test_link_clock_of_a_gateway_on_this_machine_is_the_same) {
+    connect_both();
+    hear((long long)now_us - 99999);
+    TEST_ASSERT_EQUAL_INT64(0, bridge_link_ahead_us(&link_, now_us));
+    fake_gateway_hang_up(&gateway, WATCHES);
+    step();
+    now_us += 3000U * MS;
+    const int next = gateway.count;
+    step();
+    step();
+    TEST_ASSERT_TRUE(fake_gateway_read(&gateway, next, line, sizeof line));
+    fake_gateway_reply(&gateway, next, line, true, "");
+    fake_gateway_send(&gateway, next, "{\"event\":\"state\",\"t_us\":0}");
+    step();
+    TEST_ASSERT_EQUAL_INT64(-(int64_t)now_us, bridge_link_ahead_us(&link_, now_us));
 }
 
 TEST(test_link_lost_gateway_answers_each_question_once) {

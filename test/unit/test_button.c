@@ -44,7 +44,7 @@ static gw_button_news_t hold(int answer, unsigned for_ms) {
     gw_button_news_t news = GW_BUTTON_NO_NEWS;
     for (unsigned ms = 0; ms < for_ms; ms += 10U) {
         hal.contact_last[0] = answer;
-        const gw_button_news_t one = gw_button_look(&button, &hal, now_us, &tried);
+        const gw_button_news_t one = gw_button_poll(&button, &hal, now_us, &tried);
         news = (one != GW_BUTTON_NO_NEWS) ? one : news;
         now_us += MS(10);
     }

@@ -81,16 +81,17 @@ TEST(test_json_ledger_is_stored_until_it_changes) {
     stored.length = 0;
     TEST_ASSERT_TRUE(is_trusted("{\"event\":\"bus\",\"state\":\"active\"}", &stored));
     TEST_ASSERT_EQUAL_size_t(0, stored.length);
+    TEST_ASSERT_EQUAL_size_t(0, stored.text_length);
     TEST_ASSERT_TRUE(is_trusted("{\"t_us\":1,\"ledger\":{\"a\":[1]},\"clients\":1}", &stored));
     TEST_ASSERT_EQUAL_STRING_LEN("{\"a\":[1]}", stored.value, stored.length);
     TEST_ASSERT_TRUE(is_trusted("{\"t_us\":22,\"ledger\":{\"a\":[1]},\"clients\":1}", &stored));
     TEST_ASSERT_FALSE(is_trusted("{\"t_us\":3,\"ledger\":{\"a\":[1]},\"clients\":}", &stored));
     TEST_ASSERT_FALSE(is_trusted("{\"t_us\":3,\"ledger\":{\"a\":[2},\"clients\":1}", &stored));
     TEST_ASSERT_EQUAL_size_t(strlen("{\"a\":[1]}"), stored.length);
-    TEST_ASSERT_TRUE(is_trusted("{\"t_us\":4,\"ledger\":{\"a\":[23]},\"clients\":1}", &stored));
-    TEST_ASSERT_EQUAL_STRING_LEN("{\"a\":[23]}", stored.value, stored.length);
+    TEST_ASSERT_TRUE(is_trusted("{\"t_us\":4,\"ledger\":{\"a\":[\"x\"]},\"clients\":1}", &stored));
+    TEST_ASSERT_EQUAL_STRING_LEN("{\"a\":[\"x\"]}", stored.value, stored.length);
     TEST_ASSERT_TRUE(is_trusted("{\"t_us\":5,\"ledger\":null}", &stored));
-    TEST_ASSERT_EQUAL_STRING_LEN("{\"a\":[23]}", stored.value, stored.length);
+    TEST_ASSERT_EQUAL_STRING_LEN("{\"a\":[\"x\"]}", stored.value, stored.length);
 }
 
 TEST(test_json_ledger_beyond_its_buffer_is_not_stored) {
@@ -102,6 +103,100 @@ TEST(test_json_ledger_beyond_its_buffer_is_not_stored) {
         const int length = snprintf(text, sizeof text, "{\"ledger\":{%*s}}", blanks, "");
         TEST_ASSERT_TRUE(iwc_json_is_trusted_object(text, (size_t)length, &stored));
         TEST_ASSERT_EQUAL_size_t((more == 0U) ? IWC_STORED_MAX : 0U, stored.length);
+    }
+}
+
+/// The stored text is no JSON, so only a text that is not checked again is accepted.
+TEST(test_json_text_with_other_integers_is_not_checked) {
+    static const char checked[] = "{\"a\":[1,-22,0],\"b c\":{\"d\":7},\"s\":\"x,5,y\",#}";
+    static const char *const accepted[] = {"{\"a\":[1,-22,0],\"b c\":{\"d\":7},\"s\":\"x,5,y\",#}",
+                                           "{\"a\":[1,22,0],\"b c\":{\"d\":7},\"s\":\"x,5,y\",#}",
+                                           "{\"a\":[-1,-2,-0],\"b c\":{\"d\":70},\"s\":\"x,-66,y\",#}",
+                                           "{\"a\":[123456789012345678,0,9],\"b c\":{\"d\":0},\"s\":\"x,5,y\",#}"};
+    static const char *const refused[] = {"{\"a\":[1,-22,00],\"b c\":{\"d\":7},\"s\":\"x,5,y\",#}",
+                                          "{\"a\":[1,-22,-],\"b c\":{\"d\":7},\"s\":\"x,5,y\",#}",
+                                          "{\"a\":[1,-22,0.5],\"b c\":{\"d\":7},\"s\":\"x,5,y\",#}",
+                                          "{\"a\":[1,-22,0e],\"b c\":{\"d\":7},\"s\":\"x,5,y\",#}",
+                                          "{\"a\":[1,-22,],\"b c\":{\"d\":7},\"s\":\"x,5,y\",#}",
+                                          "{\"a\":[1,--2,0],\"b c\":{\"d\":7},\"s\":\"x,5,y\",#}",
+                                          "{\"a\":[1,2-2,0],\"b c\":{\"d\":7},\"s\":\"x,5,y\",#}",
+                                          "{\"a\":[1,-22,0],\"b 1\":{\"d\":7},\"s\":\"x,5,y\",#}",
+                                          "{\"a\":[1,-22,0],\"b c\":{\"d\":true},\"s\":\"x,5,y\",#}",
+                                          "{\"a\":[1,-22,0],\"b c\":{\"d\":7},\"s\":\"x,5,y\",#",
+                                          "{\"a\":[1,-22,0],\"b c\":{\"d\":7",
+                                          "{\"a\":[1,-22,0],\"b c\":{\"d\":7},\"s\":\"x,5,y\",#}}",
+                                          "{\"a\":[1234567890123456789,0,9],\"b c\":{\"d\":0},\"s\":\"x,5,y\",#}"};
+    static iwc_stored_t stored;
+    memset(&stored, 0, sizeof stored);
+    TEST_ASSERT_FALSE(is_trusted(checked, &stored));
+    stored.text_length = strlen(checked);
+    memcpy(stored.text, checked, sizeof checked);
+    for (size_t i = 0; i < sizeof accepted / sizeof accepted[0]; i++) {
+        TEST_ASSERT_TRUE_MESSAGE(is_trusted(accepted[i], &stored), accepted[i]);
+    }
+    for (size_t i = 0; i < sizeof refused / sizeof refused[0]; i++) {
+        TEST_ASSERT_FALSE_MESSAGE(is_trusted(refused[i], &stored), refused[i]);
+    }
+}
+
+TEST(test_json_text_with_other_reals_is_checked) {
+    static const char checked[] = "{\"ledger\":{},\"a\":[1e308,1.5]}";
+    static const char *const refused[] = {"{\"ledger\":{},\"a\":[9e308,1.5]}", "{\"ledger\":{},\"a\":[1e308,1.-5]}"};
+    static iwc_stored_t stored;
+    memset(&stored, 0, sizeof stored);
+    TEST_ASSERT_TRUE(is_trusted(checked, &stored));
+    TEST_ASSERT_EQUAL_size_t(strlen(checked), stored.text_length);
+    for (size_t i = 0; i < sizeof refused / sizeof refused[0]; i++) {
+        TEST_ASSERT_FALSE_MESSAGE(is_trusted(refused[i], &stored), refused[i]);
+    }
+}
+
+static iwc_stored_t of_status; ///< With the text STATUS; it does not change.
+static unsigned of_status_accepted;
+
+static void compare_with_stored(const char *text, size_t length) {
+    static iwc_stored_t after;
+    static iwc_stored_t empty;
+    char *const copy = malloc(length + 1U); // A sanitizer finds a read beyond it.
+    memcpy(copy, text, length);
+    after.text_length = of_status.text_length;
+    memcpy(after.text, of_status.text, of_status.text_length);
+    empty.text_length = 0;
+    const bool good = iwc_json_is_trusted_object(copy, length, &empty);
+    of_status_accepted += good ? 1U : 0U;
+    TEST_ASSERT_EQUAL_MESSAGE(good, iwc_json_is_trusted_object(copy, length, &after), text);
+    free(copy);
+}
+
+TEST(test_json_stored_text_changes_no_verdict) {
+    static const char bytes[] = "\"\\{}[],:0-.eE+ x\x01\xc3\xa4nu/123456789";
+    char text[sizeof(STATUS) + 1U];
+    of_status.text_length = sizeof(STATUS) - 1U;
+    memcpy(of_status.text, STATUS, sizeof(STATUS));
+    for (size_t at = 0; at + 1U < sizeof(STATUS); at++) {
+        for (size_t i = 0; i + 1U < sizeof bytes; i++) {
+            memcpy(text, STATUS, sizeof(STATUS));
+            text[at] = bytes[i];
+            compare_with_stored(text, sizeof(STATUS) - 1U); // One byte changed.
+            memcpy(text + at + 1U, STATUS + at, sizeof(STATUS) - at);
+            compare_with_stored(text, sizeof(STATUS)); // One byte more.
+        }
+        memcpy(text + at, STATUS + at + 1U, sizeof(STATUS) - at - 1U);
+        compare_with_stored(text, sizeof(STATUS) - 2U); // One byte less.
+    }
+    TEST_ASSERT_GREATER_THAN(1000, of_status_accepted);
+}
+
+TEST(test_json_text_beyond_its_buffer_is_not_stored) {
+    static iwc_stored_t stored;
+    static char text[IWC_STORED_MAX + 64U];
+    for (size_t more = 0; more < 2U; more++) {
+        stored.text_length = 0;
+        const int blanks = (int)(IWC_STORED_MAX - strlen("{\"ledger\":{}}") + more);
+        const int length = snprintf(text, sizeof text, "{%*s\"ledger\":{}}", blanks, "");
+        TEST_ASSERT_TRUE(iwc_json_is_trusted_object(text, (size_t)length, &stored));
+        TEST_ASSERT_EQUAL_size_t((more == 0U) ? IWC_STORED_MAX : 0U, stored.text_length);
+        TEST_ASSERT_TRUE(iwc_json_is_trusted_object(text, (size_t)length, &stored));
     }
 }
 

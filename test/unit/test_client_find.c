@@ -15,12 +15,26 @@
 static char directory[] = "/tmp/iwheel-find-XXXXXX";
 static char out[256];
 
-static void add_socket(const char *name) {
+static int bind_socket(const char *name) {
     struct sockaddr_un address = {.sun_family = AF_UNIX};
     const int one = socket(AF_UNIX, SOCK_STREAM, 0);
     (void)snprintf(address.sun_path, sizeof address.sun_path, "%s/%s", directory, name);
     TEST_ASSERT_EQUAL_INT(0, bind(one, (const struct sockaddr *)&address, sizeof address));
-    (void)close(one);
+    return one;
+}
+
+/// Adds a socket file on which no program listens.
+static void add_socket(const char *name) {
+    (void)close(bind_socket(name));
+}
+
+static int listeners[2];
+static unsigned listening;
+
+static void add_live(const char *name) {
+    listeners[listening] = bind_socket(name);
+    TEST_ASSERT_EQUAL_INT(0, listen(listeners[listening], 1));
+    listening++;
 }
 
 static void add_file(const char *name) {
@@ -39,6 +53,10 @@ void setUp(void) {
 
 void tearDown(void) {
     char command[128];
+    while (listening > 0) {
+        listening--;
+        (void)close(listeners[listening]);
+    }
     (void)snprintf(command, sizeof command, "rm -r %s", directory);
     TEST_ASSERT_EQUAL_INT(0, system(command));
 }
@@ -65,8 +83,8 @@ TEST(test_find_only_gateway_is_returned) {
 }
 
 TEST(test_find_several_gateways_are_listed) {
-    add_socket("can0.sock");
-    add_socket("can1.sock");
+    add_live("can0.sock");
+    add_live("can1.sock");
     TEST_ASSERT_EQUAL(IWC_SEVERAL, iwc_find(directory, out, sizeof out));
     TEST_ASSERT_NOT_NULL(strstr(out, "/can0.sock"));
     TEST_ASSERT_NOT_NULL(strstr(out, "/can1.sock"));
@@ -74,8 +92,8 @@ TEST(test_find_several_gateways_are_listed) {
 
 TEST(test_find_list_that_does_not_fit_is_cut_between_paths) {
     char little[48];
-    add_socket("can0.sock");
-    add_socket("can1.sock");
+    add_live("can0.sock");
+    add_live("can1.sock");
     TEST_ASSERT_EQUAL(IWC_SEVERAL, iwc_find(directory, little, sizeof little));
     TEST_ASSERT_EQUAL_STRING(".sock", little + strlen(little) - 5U);
 }
@@ -132,6 +150,22 @@ TEST(test_find_watch_socket_alone_counts_as_a_gateway) {
     TEST_ASSERT_EQUAL_INT(0, unlink(path_of("can0.sock")));
     TEST_ASSERT_EQUAL(IWC_OK, iwc_find(directory, out, sizeof out));
     TEST_ASSERT_EQUAL_STRING(path_of("watch/can0.sock"), out);
-    add_socket("can1.sock");
+    TEST_ASSERT_EQUAL_INT(0, unlink(path_of("watch/can0.sock")));
+    add_live("watch/can0.sock");
+    add_live("can1.sock");
     TEST_ASSERT_EQUAL(IWC_SEVERAL, iwc_find(directory, out, sizeof out));
+}
+
+TEST(test_find_file_without_listener_is_no_second_gateway) {
+    add_socket("a.sock");
+    add_socket("z.sock");
+    TEST_ASSERT_EQUAL(IWC_OK, iwc_find(directory, out, sizeof out)); // None listens: the first file, for the error.
+    TEST_ASSERT_EQUAL_STRING(".sock", out + strlen(out) - 5U);
+    TEST_ASSERT_EQUAL(strlen(directory) + strlen("/a.sock"), strlen(out));
+    add_live("can0.sock");
+    TEST_ASSERT_EQUAL(IWC_OK, iwc_find(directory, out, sizeof out));
+    TEST_ASSERT_EQUAL_STRING(path_of("can0.sock"), out);
+    add_live("can1.sock");
+    TEST_ASSERT_EQUAL(IWC_SEVERAL, iwc_find(directory, out, sizeof out));
+    TEST_ASSERT_NULL(strstr(out, "/a.sock"));
 }

@@ -4,10 +4,14 @@
 
 #include "unity.h"
 
+#include <sched.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
+#include <sys/mount.h>
+#include <sys/prctl.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
@@ -60,6 +64,22 @@ void tearDown(void) {
     (void)unlink(watch_path);
 }
 
+// A place for stops ---------------------------------------------------------------------------------------------------
+
+static void test_adopted_for_stop_needs_no_greeting(void) {
+    int pair[2];
+    iwc_message_t message;
+    TEST_ASSERT_EQUAL_INT(0, socketpair(AF_UNIX, SOCK_STREAM, 0, pair));
+    server = pair[1];
+    TEST_ASSERT_EQUAL(IWC_OK, iwc_adopt_for_stop(gateway, pair[0]));
+    send_text("{\"id\":2,\"ok\":true}\n" HELLO);
+    TEST_ASSERT_EQUAL(IWC_OK, iwc_stop(gateway, SOON));
+    TEST_ASSERT_EQUAL_STRING("{\"id\":2,\"cmd\":\"stop\"}\n", receive());
+    TEST_ASSERT_EQUAL(IWC_OK, iwc_next(gateway, SOON, &message));
+    TEST_ASSERT_TRUE(iwc_is(&message, "event", "hello"));
+    TEST_ASSERT_EQUAL(IWC_INVALID, iwc_adopt_for_stop(gateway, -1));
+}
+
 // Optional members of a request ---------------------------------------------------------------------------------------
 
 static void test_ask_helpers_send_time_stop_and_key(void) {
@@ -81,6 +101,35 @@ static void test_ask_helpers_send_time_stop_and_key(void) {
                              receive());
 }
 
+/// The estop with this reason is sent with `sent` behind its command.
+static void expect_estop(int id, const char *reason, const char *sent) {
+    char text[512];
+    (void)snprintf(text, sizeof text, "{\"id\":%d,\"ok\":true,\"state\":\"latched\"}\n", id);
+    send_text(text);
+    TEST_ASSERT_EQUAL(IWC_OK, iwc_estop(gateway, reason, SOON));
+    (void)snprintf(text, sizeof text, "{\"id\":%d,\"cmd\":\"estop\"%s}\n", id, sent);
+    TEST_ASSERT_EQUAL_STRING(text, receive());
+}
+
+static void test_stop_never_refused_by_the_client_for_its_reason(void) {
+    char reason[5001];
+    char sent[300];
+    adopt();
+    expect_estop(2, NULL, "");
+    expect_estop(4, "", "");
+    expect_estop(6, "Traceback:\n\tline", ",\"reason\":\"Traceback:  line\"");
+    expect_estop(8, "\x7f\n", "");
+    expect_estop(10, "T\xC3\xBCr\xE2\x80\x8E \"auf\"", ",\"reason\":\"T\xC3\xBCr    \\\"auf\\\"\"");
+    expect_estop(12, "T\xFCr", ",\"reason\":\"T r\"");
+    memset(reason, 'x', sizeof reason);
+    reason[5000] = '\0';
+    (void)snprintf(sent, sizeof sent, ",\"reason\":\"%.200s\"", reason);
+    expect_estop(14, reason, sent);
+    memcpy(&reason[199], "\xE2\x82\xAC", 3); // The limit is inside of a character.
+    (void)snprintf(sent, sizeof sent, ",\"reason\":\"%.199s \"", reason);
+    expect_estop(16, reason, sent);
+}
+
 static void test_ask_arm_returns_the_key_of_the_lease(void) {
     adopt();
     char key[IWC_KEY_SIZE] = "before";
@@ -99,6 +148,8 @@ static void test_reason_without_connection_is_not_empty(void) {
 
 // Either socket -------------------------------------------------------------------------------------------------------
 
+static unsigned *lines; ///< Lines that all processes of gateways have received.
+
 /// Starts a process of a gateway that answers each connection to this socket with `reply` after its first line.
 static pid_t serve(const char *path, const char *reply) {
     struct sockaddr_un address = {.sun_family = AF_UNIX};
@@ -108,10 +159,12 @@ static pid_t serve(const char *path, const char *reply) {
     TEST_ASSERT_EQUAL_INT(0, listen(fd, 8));
     const pid_t child = fork();
     if (child == 0) {
+        (void)prctl(PR_SET_PDEATHSIG, SIGKILL); // Also one that is stopped ends with a failed test.
         for (;;) {
             char line[512];
             const int one = accept(fd, NULL, NULL);
             if (recv(one, line, sizeof line, 0) > 0) {
+                (*lines)++;
                 (void)!write(one, reply, strlen(reply));
             }
             (void)close(one);
@@ -145,7 +198,7 @@ static void test_stop_at_sends_its_line_without_a_greeting(void) {
 static void test_stop_at_missing_socket_uses_the_other_one(void) {
     pid_t child = serve(watch_path,
                         "{\"id\":4,\"ok\":true,\"state\":\"latched\"}\n{\"id\":2,\"ok\":true,\"state\":\"latched\"}\n");
-    TEST_ASSERT_EQUAL(IWC_OK, iwc_estop_at(gateway, drive_path, "stairs", LONG));
+    TEST_ASSERT_EQUAL(IWC_OK, iwc_estop_at(gateway, drive_path, "stairs\n\xFC", LONG));
     end(child);
     (void)unlink(watch_path);
     child = serve(drive_path, STOPPED);
@@ -171,16 +224,50 @@ static void test_stop_at_full_socket_alone_is_refused(void) {
 
 static void test_stop_at_without_gateway_returns_immediately(void) {
     TEST_ASSERT_EQUAL(IWC_NOT_THERE, iwc_stop_at(gateway, drive_path, IWC_FOREVER));
-    TEST_ASSERT_EQUAL(IWC_INVALID, iwc_estop_at(gateway, drive_path, "a\nb", LONG));
+    TEST_ASSERT_EQUAL(IWC_NOT_THERE, iwc_estop_at(gateway, drive_path, "a\nb", LONG));
+}
+
+/// The name space of this process has an empty /run from here on.
+static void test_stop_at_without_a_name_stops_every_gateway(void) {
+    const char *stopped = STOPPED "{\"id\":6,\"ok\":true,\"state\":\"stopping\"}\n";
+    if (unshare(CLONE_NEWNS) != 0 || mount(NULL, "/", NULL, MS_REC | MS_PRIVATE, NULL) != 0 ||
+        mount("none", "/run", "tmpfs", 0, NULL) != 0) {
+        TEST_IGNORE_MESSAGE("needs the right to mount");
+    }
+    TEST_ASSERT_EQUAL_INT(0, mkdir(IWC_DIRECTORY, 0755));
+    (void)unsetenv("IWHEEL_SOCKET");
+    const pid_t one = serve(IWC_DIRECTORY "/can0.sock", stopped);
+    const pid_t two = serve(IWC_DIRECTORY "/can1.sock", stopped);
+    const pid_t killed = serve(IWC_DIRECTORY "/can2.sock", stopped);
+    const pid_t hung = serve(IWC_DIRECTORY "/can3.sock", stopped);
+    end(killed);
+    (void)kill(hung, SIGSTOP);
+    *lines = 0;
+    TEST_ASSERT_EQUAL(IWC_SEVERAL, iwc_connect(gateway, NULL, SOON));
+    TEST_ASSERT_EQUAL(IWC_OK, iwc_stop_at(gateway, NULL, 100));
+    TEST_ASSERT_EQUAL_UINT(2, *lines);
+    end(one);
+    iwc_free(gateway);
+    gateway = iwc_new(); // Its ids start from the first again.
+    TEST_ASSERT_EQUAL(IWC_OK, iwc_estop_at(gateway, NULL, "stairs", 100));
+    TEST_ASSERT_EQUAL_UINT(3, *lines);
+    end(two);
+    TEST_ASSERT_EQUAL(IWC_TIMEOUT, iwc_stop_at(gateway, NULL, SOON));
+    end(hung);
+    TEST_ASSERT_EQUAL(IWC_NOT_THERE, iwc_stop_at(gateway, NULL, SOON));
 }
 
 int main(void) {
     UNITY_BEGIN();
+    lines = mmap(NULL, sizeof *lines, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+    TEST_ASSERT_TRUE(lines != MAP_FAILED);
     TEST_ASSERT_NOT_NULL(mkdtemp(folder));
     char watch[64];
     (void)snprintf(watch, sizeof watch, "%s/watch", folder);
     TEST_ASSERT_EQUAL_INT(0, mkdir(watch, 0755));
+    RUN_TEST(test_adopted_for_stop_needs_no_greeting);
     RUN_TEST(test_ask_helpers_send_time_stop_and_key);
+    RUN_TEST(test_stop_never_refused_by_the_client_for_its_reason);
     RUN_TEST(test_ask_arm_returns_the_key_of_the_lease);
     RUN_TEST(test_reason_without_connection_is_not_empty);
     RUN_TEST(test_stop_at_sends_its_line_without_a_greeting);
@@ -188,6 +275,7 @@ int main(void) {
     RUN_TEST(test_stop_at_full_socket_uses_the_other_one);
     RUN_TEST(test_stop_at_full_socket_alone_is_refused);
     RUN_TEST(test_stop_at_without_gateway_returns_immediately);
+    RUN_TEST(test_stop_at_without_a_name_stops_every_gateway);
     (void)rmdir(watch);
     (void)rmdir(folder);
     return UNITY_END();

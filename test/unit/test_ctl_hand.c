@@ -7,14 +7,14 @@
 #include <math.h>
 
 #define RPM     100 // 100 ticks per second: a tick is a sixtieth of a turn.
-#define LOOK_MS 20
+#define POLL_MS 20
 
 static hand_t hand;
-static hand_look_t view;
+static hand_sample_t view;
 static int64_t now_us;
 
 void setUp(void) {
-    view = (hand_look_t){.heard = true};
+    view = (hand_sample_t){.heard = true};
     now_us = 5000000;
     hand_begin(&hand, &view, now_us);
 }
@@ -30,8 +30,8 @@ static void turn_until_an_answer(int ms) {
 }
 
 static void turn(int ms) {
-    for (int i = 0; i < ms; i += LOOK_MS) {
-        turn_until_an_answer(LOOK_MS);
+    for (int i = 0; i < ms; i += POLL_MS) {
+        turn_until_an_answer(POLL_MS);
     }
 }
 
@@ -50,7 +50,7 @@ TEST(test_hand_stall_of_the_program_loses_no_ticks) {
     turn(1000);
     turn_until_an_answer(HAND_OFFLINE_US / 1000 + 100);
     view.heard = false; // Frames that waited meanwhile are not read yet.
-    turn_until_an_answer(LOOK_MS);
+    turn_until_an_answer(POLL_MS);
     view.heard = true;
     turn(1000);
     turn_until_an_answer(HAND_UNSEEN_US / 1000);
@@ -85,7 +85,7 @@ TEST(test_hand_offline_wheel_is_a_gap) {
     view.heard = false;
     turn(HAND_OFFLINE_US / 1000);
     TEST_ASSERT_TRUE(hand_is_complete(&hand));
-    turn(LOOK_MS);
+    turn(POLL_MS);
     TEST_ASSERT_EQUAL_INT(HAND_OFFLINE, hand.gap);
     view.heard = true;
     turn(1000);
@@ -104,7 +104,7 @@ TEST(test_hand_stall_with_offline_wheel_counts_as_short_gap) {
 TEST(test_hand_restarted_wheel_is_a_gap) {
     turn(100);
     view.reboots = 1;
-    turn(LOOK_MS);
+    turn(POLL_MS);
     turn_until_an_answer(HAND_UNSEEN_US / 1000 + 1); // The first reason stays.
     TEST_ASSERT_EQUAL_INT(HAND_RESTARTED, hand.gap);
     TEST_ASSERT_FALSE(hand_is_complete(&hand));

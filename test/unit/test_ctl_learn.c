@@ -334,7 +334,7 @@ TEST(test_learn_drives_beyond_the_list_count_for_the_largest) {
     drive_both(1000, straight, level);
     drive_both(300, straight, (const int16_t[IW_SIDES]){40, 50});
     TEST_ASSERT_EQUAL_UINT32(LEARN_DRIVES_MAX + 3U, drives.count);
-    TEST_ASSERT_EQUAL_UINT32(LEARN_DRIVES_MAX, learn_drives_told(&drives));
+    TEST_ASSERT_EQUAL_UINT32(LEARN_DRIVES_MAX, learn_drives_printed(&drives));
     TEST_ASSERT_UINT32_WITHIN(3, 38, drives.largest_mm);
     TEST_ASSERT_LESS_THAN_UINT32(2, drives.drive[LEARN_DRIVES_MAX - 1U].deviation_mm);
 }

@@ -119,7 +119,7 @@ TEST(test_request_has_its_own_time_and_triggers_a_step) {
     TEST_ASSERT_TRUE(daemon->wheels.requested);
     carry_out("{\"cmd\":\"estop\"}");
     TEST_ASSERT_TRUE(daemon->wheels.requested);
-    TEST_ASSERT_EQUAL_UINT64(daemon_rig.now_us, gw_wheels_look(&daemon->wheels).seen_us[IW_CAUSE_ESTOP_SOFTWARE]);
+    TEST_ASSERT_EQUAL_UINT64(daemon_rig.now_us, gw_wheels_snapshot(&daemon->wheels).seen_us[IW_CAUSE_ESTOP_SOFTWARE]);
     daemon_rig_run(2000);
     carry_out("{\"cmd\":\"reset\"}");
     TEST_ASSERT_TRUE(daemon->wheels.requested);
@@ -133,7 +133,7 @@ TEST(test_request_has_its_own_time_and_triggers_a_step) {
     daemon->wheels.time_used = true;
     daemon->wheels.requested = false;
     daemon->clients.handler.leave(daemon->clients.handler.context, &daemon->clients.client[0]);
-    TEST_ASSERT_EQUAL_UINT64(daemon_rig.now_us, gw_wheels_look(&daemon->wheels).stop->at_us);
+    TEST_ASSERT_EQUAL_UINT64(daemon_rig.now_us, gw_wheels_snapshot(&daemon->wheels).stop->at_us);
     TEST_ASSERT_TRUE(daemon->wheels.requested);
 }
 
@@ -213,7 +213,7 @@ TEST(test_status_has_the_offset_samples_of_each_wheel) {
     gw_daemon_t *daemon = daemon_rig.daemon;
     daemon->assumptions.known.offset[IW_LEFT].samples = 11;
     daemon->assumptions.known.offset[IW_RIGHT].samples = 22;
-    const iw_snapshot_t seen = gw_wheels_look(&daemon->wheels);
+    const iw_snapshot_t seen = gw_wheels_snapshot(&daemon->wheels);
     const iwn_surroundings_t around = iwn_target_around(&daemon->answers.server, &seen);
     TEST_ASSERT_EQUAL_UINT32(11, around.zero[IW_LEFT].samples);
     TEST_ASSERT_EQUAL_UINT32(22, around.zero[IW_RIGHT].samples);

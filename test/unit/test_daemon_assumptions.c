@@ -60,7 +60,7 @@ static const iw_config_t *config(void) {
 }
 
 static const iw_assumption_entry_t *entry(iw_assumption_item_t item) {
-    return iw_assumption_entry(&daemon_rig.daemon->wheels.core.assumptions, item);
+    return &daemon_rig.daemon->wheels.core.assumptions.entry[item];
 }
 
 /// Stores a finding of an earlier run for the configured value.
@@ -78,12 +78,12 @@ static void store_offset(iw_side_t side, iw_force_unit_t unit, int32_t offset_mN
 }
 
 static void observe(void) {
-    const iw_snapshot_t seen = gw_wheels_look(&daemon_rig.daemon->wheels);
+    const iw_snapshot_t seen = gw_wheels_snapshot(&daemon_rig.daemon->wheels);
     gw_assumptions_observe(&daemon_rig.daemon->assumptions, &seen);
 }
 
 /// The file process sends the text as soon as the loop runs.
-static void tell_stored(void) {
+static void print_stored(void) {
     length = gw_assumptions_file_write(&stored, daemon_rig.daemon->config.bus.interface, text, sizeof text);
     news = GW_FILE_STORE_READ;
     daemon_rig.daemon->assumptions.answered = false;
@@ -110,7 +110,7 @@ void tearDown(void) {
 
 TEST(test_stored_finding_for_the_configured_value_is_applied) {
     store(IW_ASSUMPTION_GEAR_RATIO, IW_CONFIRMED, IW_SOURCE_BUS);
-    tell_stored();
+    print_stored();
     TEST_ASSERT_EQUAL_INT(IW_CONFIRMED, entry(IW_ASSUMPTION_GEAR_RATIO)->state);
     TEST_ASSERT_EQUAL_INT(IW_SOURCE_BUS, entry(IW_ASSUMPTION_GEAR_RATIO)->source);
 }
@@ -118,13 +118,13 @@ TEST(test_stored_finding_for_the_configured_value_is_applied) {
 TEST(test_stored_finding_for_another_value_is_dropped) {
     store(IW_ASSUMPTION_GEAR_RATIO, IW_CONFIRMED, IW_SOURCE_OPERATOR);
     (void)strcpy(stored.item[IW_ASSUMPTION_GEAR_RATIO].value, "7");
-    tell_stored();
+    print_stored();
     TEST_ASSERT_EQUAL_INT(IW_ASSUMED, entry(IW_ASSUMPTION_GEAR_RATIO)->state);
 }
 
 TEST(test_stored_contradiction_denies_arm) {
     store(IW_ASSUMPTION_SETPOINT_TYPE, IW_CONTRADICTED, IW_SOURCE_OPERATOR);
-    tell_stored();
+    print_stored();
     TEST_ASSERT_EQUAL_INT(IW_CONTRADICTED, entry(IW_ASSUMPTION_SETPOINT_TYPE)->state);
     TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"arm\"}"), "\"error\":\"denied\""));
 }
@@ -133,7 +133,7 @@ TEST(test_stored_confirmation_does_not_lift_a_contradiction) {
     store(IW_ASSUMPTION_GEAR_RATIO, IW_CONFIRMED, IW_SOURCE_OPERATOR);
     iw_assumption_contradict(&daemon_rig.daemon->wheels.core.assumptions, IW_ASSUMPTION_GEAR_RATIO, IW_SOURCE_BUS,
                              3000);
-    tell_stored();
+    print_stored();
     TEST_ASSERT_EQUAL_INT(IW_CONTRADICTED, entry(IW_ASSUMPTION_GEAR_RATIO)->state);
 }
 
@@ -149,13 +149,13 @@ static bool is_warned_of(const char *what) {
 
 TEST(test_stored_button_proof_removes_the_warning) {
     const gw_wheels_t *wheels = &daemon_rig.daemon->wheels;
-    tell_stored();
+    print_stored();
     daemon_rig_run(50);
     TEST_ASSERT_TRUE(wheels->estop_untried);
     TEST_ASSERT_EQUAL_INT64(0, wheels->estop_tried_us);
     TEST_ASSERT_TRUE(is_warned_of("was never seen to work on this wiring"));
     stored.tried = (gw_tried_t){.wall_us = 1700000000000000, .contact = {{.active_high = true, .line = "ESTOP"}}};
-    tell_stored();
+    print_stored();
     daemon_rig_run(50);
     TEST_ASSERT_FALSE(wheels->estop_untried);
     TEST_ASSERT_EQUAL_INT64(1700000000000000, wheels->estop_tried_us);
@@ -179,14 +179,14 @@ TEST(test_stored_button_proof_of_another_wiring_is_void) {
     daemon_rig_run(50);
     stored.tried = (gw_tried_t){.wall_us = 1700000000000000,
                                 .contact = {{.active_high = true, .line = "OTHER", .seen = *see_line(NULL)}}};
-    tell_stored();
+    print_stored();
     daemon_rig_run(50);
     TEST_ASSERT_TRUE(wheels->estop_untried);
     TEST_ASSERT_TRUE(is_warned_of("was never seen to work on this wiring"));
     (void)strcpy(stored.tried.contact[0].line, "ESTOP");
-    tell_stored();
+    print_stored();
     stored.tried.wall_us = 1600000000000000;
-    tell_stored();
+    print_stored();
     daemon_rig_run(50);
     TEST_ASSERT_EQUAL_INT64(1700000000000000, wheels->estop_tried_us);
 }
@@ -214,7 +214,7 @@ TEST(test_battery_below_threshold_is_a_fault_and_no_stop) {
 TEST(test_stored_offset_is_restored_for_the_same_side_and_unit) {
     store_offset(IW_LEFT, config()->force_unit[IW_LEFT], 1234);
     store_offset(IW_RIGHT, (config()->force_unit[IW_RIGHT] == IW_FORCE_CN) ? IW_FORCE_DN : IW_FORCE_CN, 4321);
-    tell_stored();
+    print_stored();
     TEST_ASSERT_EQUAL_INT(IW_OFFSET_OPERATOR, daemon_rig.daemon->wheels.core.force[IW_LEFT].provenance);
     TEST_ASSERT_EQUAL_INT32(1234, daemon_rig.daemon->wheels.core.force[IW_LEFT].offset_mN);
     TEST_ASSERT_NOT_EQUAL(IW_OFFSET_OPERATOR, daemon_rig.daemon->wheels.core.force[IW_RIGHT].provenance);
@@ -223,7 +223,7 @@ TEST(test_stored_offset_is_restored_for_the_same_side_and_unit) {
 
 TEST(test_stored_offset_retains_its_time) {
     store_offset(IW_LEFT, IW_FORCE_CN, 4321);
-    tell_stored();
+    print_stored();
     daemon_rig_run(3000);
     const gw_stored_offset_t *found_entry = &daemon_rig.daemon->assumptions.known.offset[IW_LEFT];
     TEST_ASSERT_EQUAL_INT32(4321, found_entry->offset_mN);
@@ -261,7 +261,7 @@ static gw_assumptions_written_t *written(void) {
 static const char *write_status(char out_line[SOCK_REPLY_MAX]) {
     iwn_server_t *const server = &daemon_rig.daemon->answers.server;
     iwn_out_t json = iwn_server_begin_event(server, "state");
-    iwn_server_write_status(server, iwn_server_look(server), &json);
+    iwn_server_write_status(server, iwn_server_snapshot(server), &json);
     iwn_out_close(&json, '}');
     const size_t end = iwn_out_finish(&json);
     TEST_ASSERT_GREATER_THAN_size_t(1, end);
@@ -356,7 +356,7 @@ TEST(test_store_drops_the_operators_value_after_a_bus_finding) {
     gw_assumptions_t *assumptions = &daemon_rig.daemon->assumptions;
     const iw_assumption_item_t item = IW_ASSUMPTION_GEAR_RATIO;
     (void)snprintf(assumptions->known.item[item].word.found, IWN_VALUE_SIZE, "27/2");
-    iw_snapshot_t seen = gw_wheels_look(&daemon_rig.daemon->wheels);
+    iw_snapshot_t seen = gw_wheels_snapshot(&daemon_rig.daemon->wheels);
     iw_assumption_entry_t assumed[IW_ASSUMPTION_ITEMS];
     memcpy(assumed, seen.assumed, sizeof assumed);
     assumed[item] = (iw_assumption_entry_t){.state = IW_CONFIRMED, .source = IW_SOURCE_BUS, .figure = 1000};
@@ -405,7 +405,7 @@ TEST(test_status_after_tare_or_restored_file_is_current) {
     expect_new_status("right wheel tared");
     store(IW_ASSUMPTION_GEAR_RATIO, IW_CONFIRMED, IW_SOURCE_OPERATOR);
     store_offset(IW_LEFT, config()->force_unit[IW_LEFT], 1234);
-    tell_stored();
+    print_stored();
     expect_new_status("what an earlier run stored");
     TEST_ASSERT_NOT_NULL(strstr(status_before, "\"since_wall_us\":1700000000000000"));
 }
@@ -443,7 +443,7 @@ TEST(test_status_that_overflows_stores_no_bytes) {
     iwn_out_init(&json, line, sizeof line);
     iwn_server_t *const server = &daemon_rig.daemon->answers.server;
     written()->length = 0;
-    iwn_server_write_status(server, iwn_server_look(server), &json);
+    iwn_server_write_status(server, iwn_server_snapshot(server), &json);
     TEST_ASSERT_TRUE(json.overflow);
     TEST_ASSERT_EQUAL_size_t(0, written()->length);
 }

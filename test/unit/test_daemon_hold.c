@@ -34,7 +34,7 @@ static void drive_and_stop(void) {
 static void assert_held(iw_state_t state, unsigned for_ms) {
     for (unsigned ms = 0; ms < for_ms; ms += 50U) {
         daemon_rig_run(50);
-        TEST_ASSERT_TRUE(daemon_rig_is_told_zero());
+        TEST_ASSERT_TRUE(daemon_rig_commands_zero());
         TEST_ASSERT_TRUE(daemon_rig.now_us - daemon_rig.sent_us < MS(100));
         TEST_ASSERT_TRUE(daemon_rig_marked());
     }
@@ -114,7 +114,7 @@ TEST(test_hold_before_its_begin_ends_with_a_warning) {
             begin_again();
             daemon_rig_arm(client);
         }
-        TEST_ASSERT_FALSE(gw_wheels_look(&daemon_rig.daemon->wheels).holding);
+        TEST_ASSERT_FALSE(gw_wheels_snapshot(&daemon_rig.daemon->wheels).holding);
         daemon_rig_keep_log();
         TEST_ASSERT_EQUAL_INT(0, kill(getpid(), SIGTERM));
         daemon_rig_run(3000);

@@ -31,7 +31,7 @@ static void assert_next_start_sends_zeros(void) {
     daemon_rig_start();
     while (daemon_rig.now_us - begin_us < MS(1400)) {
         daemon_rig_run(20);
-        TEST_ASSERT_TRUE(daemon_rig_is_told_zero());
+        TEST_ASSERT_TRUE(daemon_rig_commands_zero());
         TEST_ASSERT_TRUE(daemon_rig.now_us - daemon_rig.sent_us < MS(100));
     }
     TEST_ASSERT_GREATER_THAN_UINT32(before + 50U, daemon_rig.sent[IW_LEFT]);
@@ -106,7 +106,7 @@ TEST(test_killed_in_the_ramp_next_start_sends_zeros) {
     daemon_rig_begin_driving(client);
     TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"stop\"}"), "\"ok\":true"));
     daemon_rig_run(60);
-    TEST_ASSERT_FALSE(daemon_rig_is_told_zero());
+    TEST_ASSERT_FALSE(daemon_rig_commands_zero());
     assert_next_start_sends_zeros();
 }
 
@@ -114,7 +114,7 @@ TEST(test_killed_in_the_hold_next_start_sends_zeros) {
     daemon_rig_begin_driving(client);
     TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"stop\"}"), "\"ok\":true"));
     daemon_rig_run(1000);
-    TEST_ASSERT_TRUE(daemon_rig_is_told_zero());
+    TEST_ASSERT_TRUE(daemon_rig_commands_zero());
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, daemon_rig_state());
     assert_next_start_sends_zeros();
 }
@@ -145,7 +145,7 @@ TEST(test_estop_edge_sends_zeros_in_the_same_millisecond) {
         daemon_rig.estop = 1;
         const iw_time_us_t pressed_us = daemon_rig.now_us;
         daemon_rig_run(1);
-        TEST_ASSERT_TRUE(daemon_rig_is_told_zero());
+        TEST_ASSERT_TRUE(daemon_rig_commands_zero());
         TEST_ASSERT_TRUE(daemon_rig.sent_us >= pressed_us);
         tearDown();
         setUp();
@@ -158,7 +158,7 @@ TEST(test_estop_unreadable_without_event_latches_within_5_ms) {
     daemon_rig.estop = -1;
     daemon_rig_run(5);
     TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
-    TEST_ASSERT_TRUE(daemon_rig_is_told_zero());
+    TEST_ASSERT_TRUE(daemon_rig_commands_zero());
 }
 
 TEST(test_estop_unreadable_on_silent_bus_latches_within_5_ms) {
@@ -172,7 +172,7 @@ TEST(test_estop_unreadable_on_silent_bus_latches_within_5_ms) {
         daemon_rig.estop_silent = true;
         daemon_rig.estop = -1;
         daemon_rig_run(5);
-        TEST_ASSERT_EQUAL_INT(-1, daemon_rig.estop_told);
+        TEST_ASSERT_EQUAL_INT(-1, daemon_rig.estop_reported);
         TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
         TEST_ASSERT_TRUE(is_cause("estop_line"));
         tearDown();
@@ -188,7 +188,7 @@ TEST(test_estop_pulse_that_ends_before_the_poll_latches) {
     daemon_rig_run(1);
     TEST_ASSERT_EQUAL_UINT32_MESSAGE(1, daemon_rig.sent_waits, "zeros leave in the cycle that the edge has begun");
     TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
-    TEST_ASSERT_TRUE(daemon_rig_is_told_zero());
+    TEST_ASSERT_TRUE(daemon_rig_commands_zero());
 }
 
 TEST(test_software_estop_stays_latched_after_its_client_ends) {
@@ -212,7 +212,7 @@ TEST(test_suspension_in_motion_latches_with_zeros_first) {
     const uint32_t before = daemon_rig.sent[IW_LEFT];
     daemon_rig_run(25);
     TEST_ASSERT_GREATER_THAN_UINT32(before, daemon_rig.sent[IW_LEFT]);
-    TEST_ASSERT_TRUE(daemon_rig_is_told_zero());
+    TEST_ASSERT_TRUE(daemon_rig_commands_zero());
     TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
     TEST_ASSERT_TRUE(is_cause("loop_hung"));
 }
@@ -228,14 +228,14 @@ TEST(test_suspension_counts_once_and_not_from_before_the_start) {
     daemon_rig.suspended_us += 200000U;
     daemon_rig_run(25);
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, daemon_rig_state());
-    TEST_ASSERT_TRUE(daemon_rig_is_told_zero());
+    TEST_ASSERT_TRUE(daemon_rig_commands_zero());
     daemon_rig_run(4000);
     daemon_rig_begin_driving(client);
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
 }
 
 TEST(test_time_never_decreases_after_a_short_suspension) {
-    while (daemon_rig.now_us - daemon_rig.looked_us > MS(1)) {
+    while (daemon_rig.now_us - daemon_rig.polled_us > MS(1)) {
         daemon_rig_run(1);
     }
     daemon_rig.suspended_us += 2000U;
@@ -250,7 +250,7 @@ TEST(test_time_never_decreases_after_a_short_suspension) {
         before_us = now_us;
     }
     TEST_ASSERT_TRUE(ahead);
-    TEST_ASSERT_EQUAL_UINT32(0, gw_wheels_look(&daemon_rig.daemon->wheels).counters->late_steps);
+    TEST_ASSERT_EQUAL_UINT32(0, gw_wheels_snapshot(&daemon_rig.daemon->wheels).counters->late_steps);
 }
 
 TEST(test_second_request_of_a_cycle_reads_the_clock_again) {
@@ -279,13 +279,13 @@ TEST(test_loop_after_a_stall_continues_with_zeros) {
     daemon_rig_begin_driving(client);
     daemon_rig.stolen_us = 150000U;
     daemon_rig_run(1);
-    TEST_ASSERT_TRUE(daemon_rig_is_told_zero());
+    TEST_ASSERT_TRUE(daemon_rig_commands_zero());
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, daemon_rig_state());
     daemon_rig_run(4000);
     daemon_rig_begin_driving(client);
     daemon_rig.stolen_us = 600000U;
     daemon_rig_run(1);
-    TEST_ASSERT_TRUE(daemon_rig_is_told_zero());
+    TEST_ASSERT_TRUE(daemon_rig_commands_zero());
     TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
 }
 
@@ -326,7 +326,7 @@ TEST(test_lease_end_by_hangup_precedes_the_last_request) {
 }
 
 /// Counts the messages READY=1 to the service manager.
-static unsigned told_ready(int manager) {
+static unsigned ready_reports(int manager) {
     char word[32];
     unsigned count = 0;
     for (ssize_t n = recv(manager, word, sizeof word, MSG_DONTWAIT); n > 0;
@@ -364,7 +364,7 @@ TEST(test_watchdog_is_fed_at_half_its_time_in_every_state) {
     (void)unsetenv("NOTIFY_SOCKET");
     (void)unsetenv("WATCHDOG_USEC");
     daemon_rig_run(500);
-    TEST_ASSERT_EQUAL_UINT(1U, told_ready(manager));
+    TEST_ASSERT_EQUAL_UINT(1U, ready_reports(manager));
     const iw_time_us_t at_rest_us = longest_unfed_us(manager, 2000);
     (void)close(client);
     client = daemon_rig_connect();
@@ -391,13 +391,13 @@ static void end_by(int number) {
     TEST_ASSERT_EQUAL_INT(0, kill(getpid(), number));
     daemon_rig_run(1);
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, daemon_rig_state());
-    TEST_ASSERT_FALSE(daemon_rig_is_told_zero());
-    const iw_time_us_t told_us = daemon_rig.now_us;
+    TEST_ASSERT_FALSE(daemon_rig_commands_zero());
+    const iw_time_us_t commanded_us = daemon_rig.now_us;
     TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"arm\"}"), "shutting down"));
     daemon_rig_run(10000);
     TEST_ASSERT_TRUE(daemon_rig.ended);
-    TEST_ASSERT_TRUE(daemon_rig_is_told_zero());
-    TEST_ASSERT_TRUE(daemon_rig.now_us - told_us >= MS(1500));
+    TEST_ASSERT_TRUE(daemon_rig_commands_zero());
+    TEST_ASSERT_TRUE(daemon_rig.now_us - commanded_us >= MS(1500));
     TEST_ASSERT_FALSE(daemon_rig_marked());
 }
 
@@ -415,6 +415,14 @@ TEST(test_signal_to_end_ramps_holds_and_removes_the_marker) {
 }
 
 /// The test itself has the name of root on the bus; only a gateway of another user checks this name.
+TEST(test_stop_of_the_gateway_itself_requests_a_step_in_this_cycle) {
+    daemon_rig_begin_driving(client);
+    gw_wheels_t *wheels = &daemon_rig.daemon->wheels;
+    TEST_ASSERT_FALSE(wheels->requested);
+    gw_wheels_stop(wheels, IW_CLIENT_NONE, IW_CAUSE_SHUTDOWN);
+    TEST_ASSERT_TRUE(wheels->requested);
+}
+
 TEST(test_gateway_that_gives_way_ramps_logs_why_and_ends) {
     if (geteuid() != 0) {
         return;
@@ -427,7 +435,7 @@ TEST(test_gateway_that_gives_way_ramps_logs_why_and_ends) {
     daemon_rig_run(10000);
     TEST_ASSERT_TRUE(daemon_rig.ended);
     TEST_ASSERT_EQUAL_INT(GW_LOOP_GIVES_WAY, daemon_rig.daemon->loop.phase);
-    TEST_ASSERT_TRUE(daemon_rig_is_told_zero());
+    TEST_ASSERT_TRUE(daemon_rig_commands_zero());
     TEST_ASSERT_FALSE(daemon_rig_marked());
     char line[96];
     (void)snprintf(line, sizeof line, "a gateway of user 0 (process %ld) serves unix:", (long)getpid());

@@ -69,7 +69,7 @@ static void test_stop_and_command_in_one_wake_up_stop(void) {
     daemon_rig_run(20);
     TEST_ASSERT_NOT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
     daemon_rig_run(3000);
-    TEST_ASSERT_TRUE(daemon_rig_is_told_zero());
+    TEST_ASSERT_TRUE(daemon_rig_commands_zero());
     crowd_goes();
 }
 

@@ -25,7 +25,7 @@ static void latch(void) {
 }
 
 static unsigned stop_number(void) {
-    return gw_wheels_look(&daemon_rig.daemon->wheels).stop->number;
+    return gw_wheels_snapshot(&daemon_rig.daemon->wheels).stop->number;
 }
 
 /// Copies the key from a reply to arm.
@@ -205,7 +205,7 @@ TEST(test_one_person_drive_with_another_key_feeds_nothing) {
         assert_reply(drive_with(other, 300), "\"error\":\"not_holder\"");
         assert_reply(drive_with("0", 300), "\"error\":\"not_holder\"");
         assert_reply(drive_with(other, 0), "\"error\":\"not_holder\"");
-        TEST_ASSERT_TRUE(daemon_rig_is_told_zero());
+        TEST_ASSERT_TRUE(daemon_rig_commands_zero());
         daemon_rig_run(20);
     }
     TEST_ASSERT_LESS_OR_EQUAL_UINT64(MS(1100), daemon_rig.now_us - armed_us); // The first lease, not longer
@@ -312,10 +312,10 @@ TEST(test_one_person_arm_without_takeover_is_busy) {
         TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, "\"error\":\"not_holder\""), reply);
     }
     arm_with_key(client, key); // The holder may arm again.
-    const iw_time_us_t until_us = gw_wheels_look(&daemon_rig.daemon->wheels).lease_until_us;
+    const iw_time_us_t until_us = gw_wheels_snapshot(&daemon_rig.daemon->wheels).lease_until_us;
     arm_with_key(client, key);
     TEST_ASSERT_EQUAL_UINT64(until_us,
-                             gw_wheels_look(&daemon_rig.daemon->wheels).lease_until_us); // The lease is the same.
+                             gw_wheels_snapshot(&daemon_rig.daemon->wheels).lease_until_us); // The lease is the same.
     assert_reply(drive_with(key, 300), "\"ok\":true");
     (void)close(other);
 }

@@ -34,7 +34,7 @@ TEST(test_estop_pressed_before_wake_latches_before_next_setpoint) {
         daemon_rig.estop = (phase % 4U < 2U) ? 1 : -1;
         daemon_rig_run(1);
         TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
-        TEST_ASSERT_TRUE(daemon_rig_is_told_zero());
+        TEST_ASSERT_TRUE(daemon_rig_commands_zero());
         TEST_ASSERT_EQUAL_INT(0, daemon_rig.most_mm_s);
         tearDown();
         setUp();
@@ -48,7 +48,7 @@ TEST(test_estop_pulse_after_wake_latches_before_next_setpoint) {
     daemon_rig_run(1);
     TEST_ASSERT_FALSE(daemon_rig.estop_late);
     TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
-    TEST_ASSERT_TRUE(daemon_rig_is_told_zero());
+    TEST_ASSERT_TRUE(daemon_rig_commands_zero());
     TEST_ASSERT_EQUAL_INT(0, daemon_rig.most_mm_s);
 }
 
@@ -80,15 +80,15 @@ TEST(test_poll_is_not_just_before_a_setpoint_and_within_3_ms) {
     for (unsigned ms = 0; ms < 150U; ms++) {
         const uint32_t sent = daemon_rig.sent[IW_LEFT];
         daemon_rig_run(1);
-        TEST_ASSERT_TRUE(daemon_rig.now_us - daemon_rig.looked_us <= MS(3));
-        TEST_ASSERT_TRUE(daemon_rig.sent[IW_LEFT] == sent || daemon_rig.unlooked_us >= MS(2));
+        TEST_ASSERT_TRUE(daemon_rig.now_us - daemon_rig.polled_us <= MS(3));
+        TEST_ASSERT_TRUE(daemon_rig.sent[IW_LEFT] == sent || daemon_rig.unpolled_us >= MS(2));
     }
 }
 
 /// Checks that the command is refused because it was sent before the stop.
 static void assert_refused_behind_a_stop(void) {
     char reply[4096] = "";
-    TEST_ASSERT_TRUE(daemon_rig_is_told_zero());
+    TEST_ASSERT_TRUE(daemon_rig_commands_zero());
     TEST_ASSERT_EQUAL_INT(0, daemon_rig.most_mm_s);
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, daemon_rig_state());
     (void)recv(client, reply, sizeof reply - 1U, MSG_DONTWAIT);
@@ -159,7 +159,7 @@ TEST(test_foreign_setpoint_latches_within_4_ms_while_frames_wait) {
             (iw_can_frame_t){.id = IW_ID_LEFT_SETPOINT, .dlc = 5, .kind = IW_CAN_RECEIVED};
         daemon_rig_run(4);
         TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
-        TEST_ASSERT_TRUE(daemon_rig_is_told_zero());
+        TEST_ASSERT_TRUE(daemon_rig_commands_zero());
         TEST_ASSERT_TRUE(daemon_rig.sent_us - before_us <= MS(4));
         tearDown();
         setUp();
@@ -175,7 +175,7 @@ TEST(test_estop_wakes_the_loop_while_frames_wait) {
         const iw_time_us_t before_us = daemon_rig.now_us;
         daemon_rig.estop = (daemon_rig.estop == 0) ? 1 : 0;
         daemon_rig_run(1);
-        TEST_ASSERT_EQUAL_INT(daemon_rig.estop, daemon_rig.estop_told);
+        TEST_ASSERT_EQUAL_INT(daemon_rig.estop, daemon_rig.estop_reported);
         TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
         TEST_ASSERT_TRUE(daemon_rig.now_us - before_us <= MS(1));
     }

@@ -40,7 +40,7 @@ TEST(test_wheel_without_power_is_a_fault_one_second_after_start) {
 
 TEST(test_status_has_at_most_the_maximum_of_warnings) {
     gw_wheels_t *wheels = &daemon_rig.daemon->wheels;
-    iw_snapshot_t seen = gw_wheels_look(wheels);
+    iw_snapshot_t seen = gw_wheels_snapshot(wheels);
     seen.holding = seen.rolling = true;
     for (wheels->warnings = IWN_WARNINGS - 2U; wheels->warnings <= IWN_WARNINGS; wheels->warnings++) {
         const iwn_surroundings_t around = iwn_target_around(&daemon_rig.daemon->answers.server, &seen);
@@ -99,7 +99,7 @@ static const char *said_after(const char *line) {
 }
 
 /// Checks that an event with this name has arrived and contains `part`.
-static void assert_told(const char *text_sent, const char *name, const char *part) {
+static void assert_reported(const char *text_sent, const char *name, const char *part) {
     char begin[64];
     char line[8192];
     (void)snprintf(begin, sizeof begin, "{\"event\":\"%s\",", name);
@@ -117,15 +117,15 @@ TEST(test_events_are_complete_and_do_not_wait_for_the_rate) {
         (void)said_after("");
     } while (daemon_rig.daemon->answers.served[0].client.next_us < daemon_rig.now_us + MS(500));
     const char *text_sent = said_after("{\"cmd\":\"arm\",\"name\":\"pendant\"}\n");
-    assert_told(text_sent, "lease", "\"change\":\"gained\"");
-    assert_told(text_sent, "lease", "\"name\":\"pendant\"");
-    assert_told(text_sent, "state", "\"state\":\"armed\"");
+    assert_reported(text_sent, "lease", "\"change\":\"gained\"");
+    assert_reported(text_sent, "lease", "\"name\":\"pendant\"");
+    assert_reported(text_sent, "state", "\"state\":\"armed\"");
     text_sent = said_after("{\"cmd\":\"stop\"}\n");
-    assert_told(text_sent, "stop", "\"cause\":\"client_stop\"");
-    assert_told(text_sent, "stop", "\"client_name\":\"pendant\"");
-    assert_told(text_sent, "lease", "\"change\":\"lost\"");
+    assert_reported(text_sent, "stop", "\"cause\":\"client_stop\"");
+    assert_reported(text_sent, "stop", "\"client_name\":\"pendant\"");
+    assert_reported(text_sent, "lease", "\"change\":\"lost\"");
     daemon_rig.bus = IW_BUS_OFF;
-    assert_told(said_after(""), "bus", "\"state\":\"bus_off\"");
+    assert_reported(said_after(""), "bus", "\"state\":\"bus_off\"");
 }
 
 TEST(test_log_has_holder_of_a_lease_and_sentence_of_a_stop) {
@@ -134,7 +134,7 @@ TEST(test_log_has_holder_of_a_lease_and_sentence_of_a_stop) {
     assert_reply("{\"cmd\":\"arm\",\"name\":\"pendant\"}", "\"ok\":true");
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(daemon_rig_log(), "lease gained: \"pendant\" (client"), daemon_rig_log());
     assert_reply("{\"cmd\":\"stop\"}", "\"ok\":true");
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(daemon_rig_log(), "lease lost: nobody"), daemon_rig_log());
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(daemon_rig_log(), "lease lost: no holder"), daemon_rig_log());
     const iwn_stop_note_t *note = &daemon_rig.daemon->answers.server.last_stop;
     (void)snprintf(sentence, sizeof sentence, "stop %u: %s\n", (unsigned)note->stop.number, note->sentence);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(daemon_rig_log(), sentence), daemon_rig_log());
@@ -218,7 +218,7 @@ TEST(test_battery_low_names_its_wheel_and_fault_is_reported_once) {
         health->present[side][GW_BATTERY_LOW] = false;
         daemon_rig_run(GW_HEALTH_US / IW_US_PER_MS + 200U);
         TEST_ASSERT_EQUAL_UINT(side + 1U, daemon_rig_logged("fault gone: battery_low"));
-        assert_told(said_after(""), "fault", "\"cause\":\"battery_low\",\"present\":false");
+        assert_reported(said_after(""), "fault", "\"cause\":\"battery_low\",\"present\":false");
     }
 }
 
@@ -226,7 +226,7 @@ TEST(test_frame_event_is_complete) {
     (void)said_after("{\"cmd\":\"watch\",\"topics\":[\"frame\"]}\n");
     daemon_rig_run(200);
     const char *text_sent = said_after("");
-    assert_told(text_sent, "frame", "\"data\":");
+    assert_reported(text_sent, "frame", "\"data\":");
 }
 
 TEST(test_button_uses_the_configured_debounce_time) {

@@ -41,8 +41,8 @@ TEST(test_drive_current_reaches_the_correct_wheel) {
                      "\"ok\":true");
         daemon_rig_run(20);
     }
-    TEST_ASSERT_EQUAL_INT(500, daemon_rig.told_mA[IW_LEFT]);
-    TEST_ASSERT_EQUAL_INT(900, daemon_rig.told_mA[IW_RIGHT]);
+    TEST_ASSERT_EQUAL_INT(500, daemon_rig.commanded_mA[IW_LEFT]);
+    TEST_ASSERT_EQUAL_INT(900, daemon_rig.commanded_mA[IW_RIGHT]);
 }
 
 TEST(test_twist_to_the_left_turns_the_right_wheel_faster) {
@@ -134,7 +134,7 @@ TEST(test_command_sent_together_with_arm_is_stale) {
     }
 }
 
-static void say_at_once(int who, const char *lines) {
+static void send_together(int who, const char *lines) {
     TEST_ASSERT_EQUAL_INT((int)strlen(lines), (int)send(who, lines, strlen(lines), MSG_NOSIGNAL));
 }
 
@@ -142,8 +142,8 @@ static void say_at_once(int who, const char *lines) {
 TEST(test_arm_followed_by_estop_of_another_client_is_refused) {
     char text[4096];
     const int other = daemon_rig_connect();
-    say_at_once(client, "{\"id\":7,\"cmd\":\"arm\"}\n");
-    say_at_once(other, "{\"cmd\":\"estop\"}\n");
+    send_together(client, "{\"id\":7,\"cmd\":\"arm\"}\n");
+    send_together(other, "{\"cmd\":\"estop\"}\n");
     daemon_rig_run(100);
     const ssize_t length = recv(client, text, sizeof text - 1U, MSG_DONTWAIT);
     TEST_ASSERT_GREATER_THAN_INT(0, (int)length);
@@ -160,8 +160,8 @@ TEST(test_reset_and_arm_that_waited_do_not_undo_a_stop) {
     const int other = daemon_rig_connect();
     daemon_rig_run(20);
     for (size_t i = 0; i < sizeof stops / sizeof stops[0]; i++) {
-        say_at_once(client, "{\"cmd\":\"arm\"}\n{\"cmd\":\"reset\"}\n{\"id\":9,\"cmd\":\"arm\"}\n");
-        say_at_once(other, stops[i]);
+        send_together(client, "{\"cmd\":\"arm\"}\n{\"cmd\":\"reset\"}\n{\"id\":9,\"cmd\":\"arm\"}\n");
+        send_together(other, stops[i]);
         daemon_rig_run(100);
         TEST_ASSERT_EQUAL_INT(after[i], daemon_rig_state());
         daemon_rig_run(2000); // Zeros are held for this time.
@@ -173,7 +173,7 @@ TEST(test_reset_and_arm_that_waited_do_not_undo_a_stop) {
 
 TEST(test_stop_and_arm_of_one_client_are_both_executed) {
     daemon_rig_run(20);
-    say_at_once(client, "{\"cmd\":\"stop\"}\n{\"cmd\":\"arm\"}\n");
+    send_together(client, "{\"cmd\":\"stop\"}\n{\"cmd\":\"arm\"}\n");
     daemon_rig_run(50);
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
 }
@@ -334,6 +334,10 @@ TEST(test_confirm_of_unset_item_is_refused_short_how_is_stored) {
     assert_reply("{\"cmd\":\"status\"}", "\"how\":\"x\"");
     assert_reply("{\"cmd\":\"confirm\",\"item\":\"gear_ratio\",\"value\":\"7\"}", "\"ok\":true");
     assert_reply("{\"cmd\":\"status\"}", "\"found\":\"7\"");
+    assert_reply("{\"cmd\":\"confirm\",\"item\":\"gear_ratio\"}",
+                 "\"ok\":true"); // Without a description it replaces the value found before.
+    const char *status = daemon_rig_ask(client, "{\"cmd\":\"status\"}");
+    TEST_ASSERT_NULL_MESSAGE(strstr(status, "\"found\":\"7\""), status);
 }
 
 TEST(test_offset_change_is_sent_to_watchers_of_force) {
@@ -364,7 +368,7 @@ TEST(test_still_moving_is_reported_once_as_a_complete_event) {
     gw_daemon_t *daemon = daemon_rig.daemon;
     static char text[8192];
     assert_reply("{\"cmd\":\"watch\",\"topics\":[\"stop\"]}", "\"ok\":true");
-    iw_snapshot_t seen = gw_wheels_look(&daemon->wheels);
+    iw_snapshot_t seen = gw_wheels_snapshot(&daemon->wheels);
     seen.still_moving++;
     gw_answers_observe(&daemon->answers, &seen);
     gw_answers_observe(&daemon->answers, &seen);
@@ -378,10 +382,10 @@ TEST(test_still_moving_is_reported_once_as_a_complete_event) {
 }
 
 /// Passes the daemon a snapshot with rolling wheels or not, and counts the matching events at a watcher.
-static unsigned count_told(bool rolling, bool is_fault, const char *words) {
+static unsigned count_reported(bool rolling, bool is_fault, const char *words) {
     static char text[8192];
     gw_daemon_t *daemon = daemon_rig.daemon;
-    iw_snapshot_t seen = gw_wheels_look(&daemon->wheels);
+    iw_snapshot_t seen = gw_wheels_snapshot(&daemon->wheels);
     seen.rolling = rolling;
     seen.rolling_fault = is_fault;
     gw_answers_observe(&daemon->answers, &seen);
@@ -398,37 +402,37 @@ static unsigned count_told(bool rolling, bool is_fault, const char *words) {
 
 TEST(test_end_of_zeros_is_reported_in_advance) {
     gw_daemon_t *daemon = daemon_rig.daemon;
-    iw_snapshot_t seen = gw_wheels_look(&daemon->wheels);
+    iw_snapshot_t seen = gw_wheels_snapshot(&daemon->wheels);
     assert_reply("{\"cmd\":\"watch\",\"topics\":[\"stop\"]}", "\"ok\":true");
     seen.zeros_ending = true;
     gw_answers_observe(&daemon->answers, &seen);
     TEST_ASSERT_TRUE(daemon->answers.server.reported.zeros_ending);
-    TEST_ASSERT_EQUAL_UINT(1, count_told(false, false, "\"cause\":\"zeros_ending\",\"present\":true}"));
+    TEST_ASSERT_EQUAL_UINT(1, count_reported(false, false, "\"cause\":\"zeros_ending\",\"present\":true}"));
 }
 
 TEST(test_rolling_is_reported_at_its_begin_and_end) {
     assert_reply("{\"cmd\":\"watch\",\"topics\":[\"stop\"]}", "\"ok\":true");
-    TEST_ASSERT_EQUAL_UINT(1, count_told(true, false, "\"present\":true}"));
-    TEST_ASSERT_EQUAL_UINT(0, count_told(true, false, "rolling"));
-    TEST_ASSERT_EQUAL_UINT(1, count_told(false, false, "\"event\":\"rolling\","));
-    TEST_ASSERT_EQUAL_UINT(1, count_told(true, false, "\"event\":\"rolling\","));
-    TEST_ASSERT_EQUAL_UINT(1, count_told(false, false, "\"present\":false}"));
+    TEST_ASSERT_EQUAL_UINT(1, count_reported(true, false, "\"present\":true}"));
+    TEST_ASSERT_EQUAL_UINT(0, count_reported(true, false, "rolling"));
+    TEST_ASSERT_EQUAL_UINT(1, count_reported(false, false, "\"event\":\"rolling\","));
+    TEST_ASSERT_EQUAL_UINT(1, count_reported(true, false, "\"event\":\"rolling\","));
+    TEST_ASSERT_EQUAL_UINT(1, count_reported(false, false, "\"present\":false}"));
 }
 
 TEST(test_rolling_after_a_stop_is_reported_once_a_minute) {
     static const char *const fault = "\"cause\":\"rolling\"";
     assert_reply("{\"cmd\":\"watch\",\"topics\":[\"stop\"]}", "\"ok\":true");
-    TEST_ASSERT_EQUAL_UINT(1, count_told(true, true, fault));
-    TEST_ASSERT_EQUAL_UINT(1, count_told(false, false, "\"cause\":\"rolling\",\"present\":false}"));
+    TEST_ASSERT_EQUAL_UINT(1, count_reported(true, true, fault));
+    TEST_ASSERT_EQUAL_UINT(1, count_reported(false, false, "\"cause\":\"rolling\",\"present\":false}"));
     daemon_rig_run(1000);
-    TEST_ASSERT_EQUAL_UINT(0, count_told(true, true, fault));
-    TEST_ASSERT_EQUAL_UINT(0, count_told(false, false, fault));
+    TEST_ASSERT_EQUAL_UINT(0, count_reported(true, true, fault));
+    TEST_ASSERT_EQUAL_UINT(0, count_reported(false, false, fault));
     daemon_rig_run(58990);
-    TEST_ASSERT_EQUAL_UINT(0, count_told(true, true, fault));
-    TEST_ASSERT_EQUAL_UINT(0, count_told(false, false, fault));
+    TEST_ASSERT_EQUAL_UINT(0, count_reported(true, true, fault));
+    TEST_ASSERT_EQUAL_UINT(0, count_reported(false, false, fault));
     daemon_rig_run(20);
-    TEST_ASSERT_EQUAL_UINT(1, count_told(true, true, "\"cause\":\"rolling\",\"present\":true}"));
-    TEST_ASSERT_EQUAL_UINT(1, count_told(false, false, fault));
+    TEST_ASSERT_EQUAL_UINT(1, count_reported(true, true, "\"cause\":\"rolling\",\"present\":true}"));
+    TEST_ASSERT_EQUAL_UINT(1, count_reported(false, false, fault));
 }
 
 /// Returns the number of recordings that were ordered since the last call, and the last of them.
@@ -447,22 +451,22 @@ TEST(test_rolling_fault_is_recorded_with_each_report) {
     TEST_ASSERT_EQUAL_INT(0, socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends));
     box->config.blackbox_s = 1;
     box->writer.fd = ends[0];
-    (void)count_told(true, false, "rolling");
+    (void)count_reported(true, false, "rolling");
     TEST_ASSERT_EQUAL_UINT(0, take_orders(ends[1], &order)); // A person pushes the machine.
-    (void)count_told(true, true, "rolling");
+    (void)count_reported(true, true, "rolling");
     TEST_ASSERT_EQUAL_UINT(1, take_orders(ends[1], &order));
     TEST_ASSERT_EQUAL_STRING("rolling", order.cause);
     TEST_ASSERT_EQUAL_STRING("listening", order.from);
     TEST_ASSERT_EQUAL_UINT32(0, order.note.stop.number);
     TEST_ASSERT_NOT_NULL(strstr(order.note.sentence, "parking brake"));
-    (void)count_told(false, false, "rolling");
+    (void)count_reported(false, false, "rolling");
     daemon_rig_run(1000);
-    (void)count_told(true, true, "rolling");
+    (void)count_reported(true, true, "rolling");
     TEST_ASSERT_EQUAL_UINT(0, take_orders(ends[1], &order)); // Second fault within a minute
     (void)close(ends[1]);
-    (void)count_told(false, false, "rolling");
+    (void)count_reported(false, false, "rolling");
     daemon_rig_run(60000);
-    (void)count_told(true, true, "rolling"); // Without a writer the loop continues.
+    (void)count_reported(true, true, "rolling"); // Without a writer the loop continues.
     box->config.blackbox_s = 0;
     box->writer.fd = -1;
     (void)close(ends[0]);

@@ -14,7 +14,7 @@
 #define CROWD          160U
 #define FOREIGN        65534U
 
-static const char *const stops[] = {"{\"cmd\":\"stop\"}\n", "{\"cmd\":\"estop\",\"reason\":\"crowd\"}\n",
+static const char *const stops[] = {"{\"cmd\":\"stop\",\"now\":true}\n", "{\"cmd\":\"estop\",\"reason\":\"crowd\"}\n",
                                     "{\"id\":7,\"cmd\":\"disarm\"}\n"};
 static int crowd[CROWD];
 static unsigned crowded;
@@ -223,7 +223,7 @@ TEST(test_stop_place_for_anything_else_is_refused) {
                                          "{\"cmd\":\"watch\",\"topics\":[\"frame\"]}\n",
                                          "stop\n",
                                          "\n",
-                                         "{\"cmd\":\"stop\",\"now\":true}\n"};
+                                         "{\"cmd\":\"stop\",}\n"};
     take_all_places();
     begin_driving();
     for (sock_right_t right = SOCK_DRIVE; right < SOCK_RIGHTS; right++) {
@@ -297,7 +297,7 @@ TEST(test_stop_of_an_overflowing_holder_has_cause_client_stop) {
     begin_driving();
     ask_too_much_and_stop(client, &daemon_rig.daemon->clients.client[0]);
     assert_slower("closed");
-    TEST_ASSERT_EQUAL_INT(IW_CAUSE_CLIENT_STOP, gw_wheels_look(&daemon_rig.daemon->wheels).stop->cause);
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_CLIENT_STOP, gw_wheels_snapshot(&daemon_rig.daemon->wheels).stop->cause);
 }
 
 TEST(test_stop_place_answers_one_line_and_all_stops) {
@@ -366,6 +366,9 @@ TEST(test_stop_places_of_one_user_are_at_most_half) {
         TEST_ASSERT_LESS_OR_EQUAL_UINT(SOCK_STOP_PLACES / 2U, held_by(FOREIGN));
     }
     TEST_ASSERT_EQUAL_UINT(SOCK_STOP_PLACES / 2U, held_by(FOREIGN));
+    const char *oldest = receive(crowd[crowded - 12U]);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(oldest, "\"error\":\"too_many_clients\""), oldest);
+    TEST_ASSERT_EQUAL_STRING_MESSAGE("", receive(crowd[crowded - 1U]), "the newest replaces it");
     join(SOCK_DRIVE, SOCK_STOP_PLACES / 2U); // The other half is for other users, who are not evicted.
     TEST_ASSERT_EQUAL_UINT(SOCK_STOP_PLACES / 2U, held_by(0));
     crowd[crowded++] = knock_as(FOREIGN, SOCK_DRIVE);
@@ -376,6 +379,25 @@ TEST(test_stop_places_of_one_user_are_at_most_half) {
     send_lines(fd, stops[0]);
     assert_slower("beyond its share");
     (void)close(fd);
+}
+
+/// Most of the lines are still in the socket when the gateway detects that the client has gone.
+TEST(test_stop_behind_other_lines_of_a_client_that_has_gone) {
+    static const char *const others[] = {"{\"cmd\":\"status\"}\n", "{\"cmd\":\"hello\"}\n"};
+    for (unsigned n = 0; n < 4U; n++) {
+        begin_driving();
+        const int fd = knock((n < 2U) ? SOCK_DRIVE : SOCK_WATCH);
+        daemon_rig_run(2);
+        static char lines[16384];
+        lines[0] = '\0';
+        for (unsigned i = 0; i < 600U; i++) {
+            (void)strcat(lines, others[n % 2U]);
+        }
+        send_lines(fd, strcat(lines, stops[n % 2U]));
+        (void)close(fd);
+        assert_slower(others[n % 2U]);
+        come_to_rest();
+    }
 }
 
 TEST(test_stop_in_a_stop_place_names_its_process) {

@@ -294,11 +294,30 @@ TEST(test_flood_of_requests_of_a_watcher_is_served_at_its_rate) {
     TEST_ASSERT_EQUAL_UINT_MESSAGE(SOCK_LINES_PER_CYCLE, replies_of(watcher), "after a pause");
 }
 
+TEST(test_stop_of_a_watcher_precedes_its_waiting_requests) {
+    static const char *const stops[] = {"{\"cmd\":\"stop\"}\n", "{\"cmd\":\"estop\",\"reason\":\"late\"}\n"};
+    for (unsigned n = 0; n < 2U; n++) {
+        daemon_rig_arm(driver);
+        daemon_rig_drive(driver, 300, 300, 500);
+        for (unsigned i = 0; i < 150U; i++) {
+            send_line(watcher, (i % 15U == 0U) ? "{\"cmd\":\"hello\",\"id\":\"stop\"}\n" : "{\"cmd\":\"hello\"}\n");
+        }
+        daemon_rig_run(1);
+        send_line(watcher, stops[n]);
+        const uint32_t number = gw_wheels_snapshot(&daemon_rig.daemon->wheels).stop->number;
+        daemon_rig_run(SOCK_WATCHER_LINE_US / IW_US_PER_MS + 5U);
+        TEST_ASSERT_EQUAL_UINT32(number + 1U, gw_wheels_snapshot(&daemon_rig.daemon->wheels).stop->number);
+        daemon_rig_run(4000); // The other lines are executed in their order, at their rate, and none stops again.
+        TEST_ASSERT_EQUAL_UINT32(number + 1U, gw_wheels_snapshot(&daemon_rig.daemon->wheels).stop->number);
+        (void)replies_of(watcher);
+    }
+}
+
 TEST(test_flood_of_estop_latches_and_adds_few_stops) {
     daemon_rig_arm(driver);
     daemon_rig_drive(driver, 300, 300, 500);
     connect_crowd(CROWD - 1U);
-    const uint32_t stops = gw_wheels_look(&daemon_rig.daemon->wheels).stop->number;
+    const uint32_t stops = gw_wheels_snapshot(&daemon_rig.daemon->wheels).stop->number;
     for (unsigned n = 0; n < 50U; n++) {
         for (unsigned i = 0; i < crowded; i++) {
             send_line(crowd[i], "{\"cmd\":\"estop\"}\n");
@@ -306,7 +325,7 @@ TEST(test_flood_of_estop_latches_and_adds_few_stops) {
         daemon_rig_run(20);
         TEST_ASSERT_EQUAL_INT(0, daemon_rig.commanded_mm_s[IW_LEFT]);
     }
-    const iw_snapshot_t seen = gw_wheels_look(&daemon_rig.daemon->wheels);
+    const iw_snapshot_t seen = gw_wheels_snapshot(&daemon_rig.daemon->wheels);
     TEST_ASSERT_TRUE(daemon_rig.now_us - seen.seen_us[IW_CAUSE_ESTOP_SOFTWARE] <= IWN_ESTOP_AGAIN_US + MS(20));
     TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, seen.state);
     TEST_ASSERT_LESS_OR_EQUAL_UINT(stops + 2U, seen.stop->number);
@@ -316,7 +335,7 @@ TEST(test_flood_of_estop_latches_and_adds_few_stops) {
 }
 
 static iw_time_us_t estop_seen_us(void) {
-    return gw_wheels_look(&daemon_rig.daemon->wheels).seen_us[IW_CAUSE_ESTOP_SOFTWARE];
+    return gw_wheels_snapshot(&daemon_rig.daemon->wheels).seen_us[IW_CAUSE_ESTOP_SOFTWARE];
 }
 
 TEST(test_estop_repeated_within_100_ms_is_answered_without_effect) {
@@ -434,9 +453,9 @@ TEST(test_round_of_sending_ends_after_its_time) {
     iwn_server_t *server = &daemon_rig.daemon->answers.server;
     iwn_out_t json = iwn_server_begin_event(server, "state");
     iwn_server_send_event(server, IWN_TOPIC_STATE, &json);
-    daemon_rig.look_takes_us = 100U;
+    daemon_rig.poll_takes_us = 100U;
     sock_service_flush(clients, IW_CLIENT_NONE);
-    daemon_rig.look_takes_us = 0;
+    daemon_rig.poll_takes_us = 0;
     unsigned reached = 0;
     for (unsigned i = 0; i < crowded; i++) {
         reached += (recv(crowd[i], text, sizeof text, MSG_DONTWAIT) > 0) ? 1U : 0U;
@@ -444,8 +463,8 @@ TEST(test_round_of_sending_ends_after_its_time) {
     TEST_ASSERT_UINT_WITHIN(1, SOCK_ROUND_US / 100U, reached);
     TEST_ASSERT_TRUE(sock_service_is_busy(clients));
     daemon_rig_run(20); // All is sent: a client without waiting bytes needs no time.
-    daemon_rig.look_takes_us = 2U * SOCK_ROUND_US;
+    daemon_rig.poll_takes_us = 2U * SOCK_ROUND_US;
     sock_service_flush(clients, IW_CLIENT_NONE);
-    daemon_rig.look_takes_us = 0;
+    daemon_rig.poll_takes_us = 0;
     TEST_ASSERT_FALSE(clients->lines_wait);
 }

@@ -18,7 +18,7 @@
 #include <unistd.h>
 
 static size_t length;
-static char folder[] = "/tmp/iwheel-keeper-XXXXXX";
+static char folder[] = "/tmp/iwheel-store-XXXXXX";
 static gw_file_store_t store;
 static const char *reply;
 static int error;

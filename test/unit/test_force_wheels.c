@@ -108,7 +108,7 @@ static void start_loaded_in_sight(void) {
 
 TEST(test_force_observed_loaded_start_has_no_offset_until_tare) {
     start_loaded_in_sight();
-    TEST_ASSERT_TRUE(force(IW_LEFT)->boot_seen && force(IW_LEFT)->wheel_offset_heard);
+    TEST_ASSERT_TRUE(force(IW_LEFT)->boot_seen && force(IW_LEFT)->wheel_offset_received);
     TEST_ASSERT_INT32_WITHIN(120, 1123, force(IW_LEFT)->wheel_offset_dN); // It includes the weight of the person.
     TEST_ASSERT_EQUAL_INT(IW_OFFSET_NONE, force(IW_LEFT)->provenance);
     load_both(0);

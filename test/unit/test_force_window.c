@@ -107,7 +107,7 @@ TEST(test_force_deviation_has_a_resolution_of_1_mN) {
 }
 
 /// Adds pairs of samples this far above and below zero.
-static void hear_pairs(uint32_t pairs, int16_t by) {
+static void receive_pairs(uint32_t pairs, int16_t by) {
     for (uint32_t pair = 0; pair < pairs; pair++) {
         force_rig_hear(&rig, by, true);
         force_rig_hear(&rig, (int16_t)-by, true);
@@ -121,13 +121,13 @@ TEST(test_force_large_deviation_is_exact) {
 }
 
 TEST(test_force_deviation_is_finer_up_to_a_variance_of_400000) {
-    hear_pairs(2, 2000);
-    hear_pairs(18, 0);
+    receive_pairs(2, 2000);
+    receive_pairs(18, 0);
     TEST_ASSERT_EQUAL_UINT32(6324, rig.force.quality.deviation_mN); // The root of 400 000 is 632.4.
     begin(IW_LEFT, false);
-    hear_pairs(2, 2000);
-    hear_pairs(1, 2);
-    hear_pairs(17, 1);
+    receive_pairs(2, 2000);
+    receive_pairs(1, 2);
+    receive_pairs(17, 1);
     TEST_ASSERT_EQUAL_UINT32(6320, rig.force.quality.deviation_mN); // 400 001
 }
 
@@ -138,8 +138,8 @@ TEST(test_force_deviation_is_rounded_down) {
 }
 
 TEST(test_force_noise_1_mN_beyond_1_N_is_noisy) {
-    hear_pairs(2, 102);
-    hear_pairs(18, 100);
+    receive_pairs(2, 102);
+    receive_pairs(18, 100);
     TEST_ASSERT_EQUAL_UINT32(1001, rig.force.quality.deviation_mN);
     assert_window(IW_WINDOW_NOISY);
 }
@@ -277,7 +277,7 @@ TEST(test_force_estimate_is_made_once) {
     TEST_ASSERT_EQUAL_INT32(49000, iw_force_net_mN(&rig.force));
 }
 
-static iw_unit_observation_t evidence_of(iw_side_t side, int16_t raw, int16_t offset_dN) {
+static iw_unit_observation_t unit_of(iw_side_t side, int16_t raw, int16_t offset_dN) {
     begin(side, false);
     force_rig_quiet(&rig, 40, raw);
     force_rig_offset(&rig, offset_dN);
@@ -289,45 +289,45 @@ TEST(test_force_unit_follows_from_raw_over_offset) {
     for (int side = 0; side < IW_SIDES; side++) {
         for (size_t i = 0; i < 6; i++) {
             const int16_t offset = offsets_dN[i];
-            TEST_ASSERT_EQUAL_INT(IW_UNIT_CN, evidence_of((iw_side_t)side, (int16_t)(10 * offset), offset));
+            TEST_ASSERT_EQUAL_INT(IW_UNIT_CN, unit_of((iw_side_t)side, (int16_t)(10 * offset), offset));
             TEST_ASSERT_EQUAL_INT32(10000, rig.force.observed_permille);
-            TEST_ASSERT_EQUAL_INT(IW_UNIT_CN, evidence_of((iw_side_t)side, (int16_t)(9 * offset), offset));
-            TEST_ASSERT_EQUAL_INT(IW_UNIT_CN, evidence_of((iw_side_t)side, (int16_t)(11 * offset), offset));
-            TEST_ASSERT_EQUAL_INT(IW_UNIT_DN, evidence_of((iw_side_t)side, offset, offset));
+            TEST_ASSERT_EQUAL_INT(IW_UNIT_CN, unit_of((iw_side_t)side, (int16_t)(9 * offset), offset));
+            TEST_ASSERT_EQUAL_INT(IW_UNIT_CN, unit_of((iw_side_t)side, (int16_t)(11 * offset), offset));
+            TEST_ASSERT_EQUAL_INT(IW_UNIT_DN, unit_of((iw_side_t)side, offset, offset));
             TEST_ASSERT_EQUAL_INT32(1000, rig.force.observed_permille);
-            TEST_ASSERT_EQUAL_INT(IW_UNIT_OFFSET_REMOVED, evidence_of((iw_side_t)side, 0, offset));
-            TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, evidence_of((iw_side_t)side, (int16_t)(4 * offset), offset));
-            TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, evidence_of((iw_side_t)side, (int16_t)(offset / 2), offset));
-            TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, evidence_of((iw_side_t)side, (int16_t)(-offset), offset));
-            TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, evidence_of((iw_side_t)side, (int16_t)(-10 * offset), offset));
-            TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, evidence_of((iw_side_t)side, (int16_t)(14 * offset), offset));
+            TEST_ASSERT_EQUAL_INT(IW_UNIT_OFFSET_REMOVED, unit_of((iw_side_t)side, 0, offset));
+            TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, unit_of((iw_side_t)side, (int16_t)(4 * offset), offset));
+            TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, unit_of((iw_side_t)side, (int16_t)(offset / 2), offset));
+            TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, unit_of((iw_side_t)side, (int16_t)(-offset), offset));
+            TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, unit_of((iw_side_t)side, (int16_t)(-10 * offset), offset));
+            TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, unit_of((iw_side_t)side, (int16_t)(14 * offset), offset));
         }
     }
 }
 
 TEST(test_force_unit_observation_tolerates_15_percent) {
-    TEST_ASSERT_EQUAL_INT(IW_UNIT_CN, evidence_of(IW_LEFT, 8500, 1000));
-    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, evidence_of(IW_LEFT, 8499, 1000));
-    TEST_ASSERT_EQUAL_INT(IW_UNIT_CN, evidence_of(IW_LEFT, 11500, 1000));
-    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, evidence_of(IW_LEFT, 11501, 1000));
-    TEST_ASSERT_EQUAL_INT(IW_UNIT_DN, evidence_of(IW_LEFT, 850, 1000));
-    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, evidence_of(IW_LEFT, 849, 1000));
-    TEST_ASSERT_EQUAL_INT(IW_UNIT_DN, evidence_of(IW_LEFT, 1150, 1000));
-    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, evidence_of(IW_LEFT, 1151, 1000));
-    TEST_ASSERT_EQUAL_INT(IW_UNIT_OFFSET_REMOVED, evidence_of(IW_LEFT, 300, 1000));
-    TEST_ASSERT_EQUAL_INT(IW_UNIT_OFFSET_REMOVED, evidence_of(IW_LEFT, -300, 1000));
-    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, evidence_of(IW_LEFT, 301, 1000));
-    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, evidence_of(IW_LEFT, -301, 1000));
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_CN, unit_of(IW_LEFT, 8500, 1000));
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, unit_of(IW_LEFT, 8499, 1000));
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_CN, unit_of(IW_LEFT, 11500, 1000));
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, unit_of(IW_LEFT, 11501, 1000));
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_DN, unit_of(IW_LEFT, 850, 1000));
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, unit_of(IW_LEFT, 849, 1000));
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_DN, unit_of(IW_LEFT, 1150, 1000));
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, unit_of(IW_LEFT, 1151, 1000));
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_OFFSET_REMOVED, unit_of(IW_LEFT, 300, 1000));
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_OFFSET_REMOVED, unit_of(IW_LEFT, -300, 1000));
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, unit_of(IW_LEFT, 301, 1000));
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, unit_of(IW_LEFT, -301, 1000));
 }
 
 TEST(test_force_small_offset_is_unknown_unless_far_off) {
-    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNKNOWN, evidence_of(IW_LEFT, 190, 19));
-    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNKNOWN, evidence_of(IW_LEFT, 0, -19));
-    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNKNOWN, evidence_of(IW_LEFT, 2000, 0));
-    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNKNOWN, evidence_of(IW_LEFT, 2100, 10));
-    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, evidence_of(IW_LEFT, 2101, 10));
-    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, evidence_of(IW_LEFT, 2001, 0));
-    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, evidence_of(IW_LEFT, -2001, 0));
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNKNOWN, unit_of(IW_LEFT, 190, 19));
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNKNOWN, unit_of(IW_LEFT, 0, -19));
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNKNOWN, unit_of(IW_LEFT, 2000, 0));
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNKNOWN, unit_of(IW_LEFT, 2100, 10));
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, unit_of(IW_LEFT, 2101, 10));
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, unit_of(IW_LEFT, 2001, 0));
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, unit_of(IW_LEFT, -2001, 0));
     TEST_ASSERT_EQUAL_INT(IW_FORCE_OFFSET_DOUBTED, force_rig_validity(&rig));
 }
 

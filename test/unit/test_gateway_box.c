@@ -15,8 +15,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
 #include <sys/mount.h>
-#include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -28,8 +28,14 @@ static gw_box_t box;
 static char folder[64];
 static bool open_box;
 
+static off_t *synced; ///< Bytes of all files at their last fsync, in memory that the writer process shares.
+
 /// Succeeds and sets errno, as any call may do.
 int fsync(int fd) {
+    struct stat status;
+    if (synced != NULL && fstat(fd, &status) == 0 && S_ISREG(status.st_mode)) {
+        *synced += status.st_size;
+    }
     errno = (fd >= 0) ? ENOSPC : EBADF;
     return (fd >= 0) ? 0 : -1;
 }
@@ -98,7 +104,7 @@ static gw_box_order_t stopped(const char *cause) {
 
 static void record_order(const gw_box_order_t *order, int error) {
     TEST_ASSERT_TRUE(gw_box_write(&box, order));
-    TEST_ASSERT_EQUAL(GW_CHILD_SAID, wait_news());
+    TEST_ASSERT_EQUAL(GW_CHILD_MESSAGE, wait_news());
     TEST_ASSERT_EQUAL(3, box.last.number);
     TEST_ASSERT_EQUAL(error, box.last.error);
 }
@@ -123,7 +129,7 @@ static void record_harmless(const char *cause) {
     blackbox_ring_put(box.ring, &rest);
     order.mark = blackbox_ring_written(box.ring);
     TEST_ASSERT_TRUE(gw_box_write(&box, &order));
-    TEST_ASSERT_EQUAL(GW_CHILD_SAID, wait_news());
+    TEST_ASSERT_EQUAL(GW_CHILD_MESSAGE, wait_news());
 }
 
 static bool is_there(const char *name) {
@@ -172,6 +178,37 @@ TEST(test_recording_has_frames_events_and_configuration) {
     TEST_ASSERT_EQUAL_STRING(CONFIG, text);
 }
 
+TEST(test_recording_has_wall_clock_times) {
+    char text[8192];
+    char line[64];
+    start();
+    const gw_box_order_t order = stopped("estop_line");
+    record_order(&order, 0);
+    const uint64_t first_us = order.note.stop.at_us - 1000U + (uint64_t)order.wall_minus_us;
+    (void)snprintf(line, sizeof line, "(%llu.%06llu) can0 100#00000000 R\n", (unsigned long long)first_us / 1000000U,
+                   (unsigned long long)first_us % 1000000U);
+    read_file("stop-000001-estop_line.log", text, sizeof text);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, line), text);
+}
+
+TEST(test_recording_is_on_the_disk_to_its_last_byte) {
+    static const char *const names[] = {"stop-000001-estop_line.log", "stop-000001-estop_line.jsonl",
+                                        "stop-000001-estop_line.conf"};
+    char text[8192];
+    off_t bytes = 0;
+    synced = mmap(NULL, sizeof *synced, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+    TEST_ASSERT_TRUE(synced != MAP_FAILED);
+    start();
+    record("estop_line", 0);
+    for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
+        read_file(names[i], text, sizeof text);
+        bytes += (off_t)strlen(text);
+    }
+    TEST_ASSERT_EQUAL_INT(bytes, *synced);
+    (void)munmap(synced, sizeof *synced);
+    synced = NULL;
+}
+
 TEST(test_recording_contains_entries_after_the_stop) {
     char text[8192];
     start();
@@ -187,7 +224,7 @@ TEST(test_recording_contains_entries_after_the_stop) {
     blackbox_ring_put(box.ring, &frame);
     blackbox_ring_put(box.ring, &state);
     TEST_ASSERT_TRUE(gw_box_write(&box, &order));
-    TEST_ASSERT_EQUAL(GW_CHILD_SAID, wait_news());
+    TEST_ASSERT_EQUAL(GW_CHILD_MESSAGE, wait_news());
     TEST_ASSERT_EQUAL(11, box.last.frames);
     read_file("stop-000001-estop_line.jsonl", text, sizeof text);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "\"bus\":\"can0\""), text);
@@ -318,92 +355,6 @@ TEST(test_recording_of_an_old_version_is_judged_by_its_command) {
     TEST_ASSERT_FALSE(gw_box_line_is_harmless(""));
 }
 
-/// Writes the recordings `first` to `last` of a stop with this speed, without the writer process.
-static void make_recordings(unsigned first, unsigned last, int speed_mm_s) {
-    for (unsigned number = first; number <= last; number++) {
-        char path[256];
-        (void)snprintf(path, sizeof path, "%s/stop-%06u-made.jsonl", config.record.directory, number);
-        FILE *file = fopen(path, "w");
-        TEST_ASSERT_NOT_NULL(file);
-        (void)fprintf(file, "{}\n{\"type\":\"why\",\"applied_left_mm_s\":%d,\"applied_right_mm_s\":0,\"at_us\":1}\n",
-                      speed_mm_s);
-        (void)fclose(file);
-    }
-}
-
-/// Opens a record directory in memory, for tests with many files.
-static int open_in_memory(void) {
-    (void)snprintf(config.record.directory, sizeof config.record.directory, "/dev/shm/%s", strrchr(folder, '/') + 1);
-    return gw_box_files_open(config.record.directory);
-}
-
-static unsigned long calls; // Number of calls that read the state of a file.
-
-int __wrap_fstatat(int directory, const char *name, struct stat *out_status, int flags);
-int __real_fstatat(int directory, const char *name, struct stat *out_status, int flags);
-
-int __wrap_fstatat(int directory, const char *name, struct stat *out_status, int flags) {
-    calls++;
-    return __real_fstatat(directory, name, out_status, flags);
-}
-
-/// The first pass over the directory reads the state of each file; no other does.
-TEST(test_rotation_cost_per_recording_is_constant) {
-    static const unsigned counts[] = {32, 1000, 10000};
-    const int directory = open_in_memory();
-    for (size_t i = 0; i < sizeof counts / sizeof counts[0]; i++) {
-        for (unsigned file = 0; file < counts[i] * GW_BOX_ENDINGS; file++) {
-            char name[64];
-            (void)snprintf(name, sizeof name, "stop-%06u-made%s", file / GW_BOX_ENDINGS + 1U,
-                           gw_box_endings[file % GW_BOX_ENDINGS]);
-            const int fd = openat(directory, name, O_WRONLY | O_CREAT | O_CLOEXEC, 0644);
-            TEST_ASSERT_EQUAL(0, close(fd));
-        }
-        calls = 0;
-        gw_box_files_rotate(directory, &(gw_box_limits_t){8, UINT64_MAX, counts[i] + 1U, true, 0});
-        TEST_ASSERT_LESS_OR_EQUAL(3UL * counts[i] + 100UL, calls);
-        TEST_ASSERT_EQUAL(8U * GW_BOX_ENDINGS, count_files());
-    }
-    (void)close(directory);
-}
-
-/// This number of recordings requires more than one pass over the directory.
-TEST(test_rotation_of_33000_recordings_retains_motion) {
-    const int directory = open_in_memory();
-    make_recordings(1, 3, 500);
-    make_recordings(4, 33000, 0);
-    gw_box_files_rotate(directory, &(gw_box_limits_t){8, UINT64_MAX, 33000, false, 0});
-    TEST_ASSERT_EQUAL(8, count_files());
-    TEST_ASSERT_TRUE(is_there("stop-000001-made.jsonl"));
-    TEST_ASSERT_TRUE(is_there("stop-000003-made.jsonl"));
-    TEST_ASSERT_FALSE(is_there("stop-032995-made.jsonl"));
-    TEST_ASSERT_TRUE(is_there("stop-032996-made.jsonl"));
-    (void)close(directory);
-}
-
-TEST(test_recording_of_a_single_file_can_be_dropped) {
-    const int directory = gw_box_files_open(config.record.directory);
-    make_recordings(1, 1, 0);
-    TEST_ASSERT_TRUE(gw_box_files_drop_oldest(directory, &(gw_box_limits_t){.below = 2}));
-    TEST_ASSERT_EQUAL(0, count_files());
-    (void)close(directory);
-}
-
-TEST(test_reserve_that_cannot_be_allocated_is_removed) {
-    struct rlimit before;
-    const int directory = gw_box_files_open(config.record.directory);
-    TEST_ASSERT_EQUAL(0, getrlimit(RLIMIT_FSIZE, &before));
-    const struct rlimit small = {.rlim_cur = 4096, .rlim_max = before.rlim_max};
-    (void)signal(SIGXFSZ, SIG_IGN);
-    TEST_ASSERT_EQUAL(0, setrlimit(RLIMIT_FSIZE, &small));
-    gw_box_files_reserve(directory, 1000000U);
-    TEST_ASSERT_EQUAL(0, setrlimit(RLIMIT_FSIZE, &before));
-    TEST_ASSERT_FALSE(is_there("reserve"));
-    gw_box_files_reserve(directory, 1000000U);
-    TEST_ASSERT_TRUE(is_there("reserve"));
-    (void)close(directory);
-}
-
 /// Mounts a small disk. Requires the right to mount.
 static bool mount_small_disk(void) {
     (void)mkdir(config.record.directory, 0755);
@@ -454,7 +405,7 @@ TEST(test_full_disk_drops_harmless_recordings_first) {
 TEST(test_missing_directory_is_reported_at_start_and_each_stop) {
     (void)snprintf(config.record.directory, sizeof config.record.directory, "%s/no/such/folder", folder);
     start();
-    TEST_ASSERT_EQUAL(GW_CHILD_SAID, wait_news());
+    TEST_ASSERT_EQUAL(GW_CHILD_MESSAGE, wait_news());
     TEST_ASSERT_EQUAL(0, box.last.number);
     TEST_ASSERT_EQUAL(ENOENT, box.last.error);
     record("estop_line", ENOENT);
@@ -495,7 +446,7 @@ TEST(test_directory_that_appears_later_is_used) {
     char command[160];
     (void)snprintf(config.record.directory, sizeof config.record.directory, "%s/no/folder", folder);
     start();
-    TEST_ASSERT_EQUAL(GW_CHILD_SAID, wait_news());
+    TEST_ASSERT_EQUAL(GW_CHILD_MESSAGE, wait_news());
     (void)snprintf(command, sizeof command, "mkdir %s/no", folder);
     TEST_ASSERT_EQUAL(0, system(command));
     record("estop_line", 0);
@@ -588,10 +539,10 @@ TEST(test_rolling_is_recorded_and_is_no_stop) {
     start();
     record("estop_line", 0);
     sock_log_open(&log, SOCK_LOG_ERROR);
-    seen.wheel[IW_LEFT] = (iw_snapshot_wheel_t){.told = &line, .speed_mm_s = 1500};
-    seen.wheel[IW_RIGHT] = (iw_snapshot_wheel_t){.told = &line, .speed_mm_s = -101, .heard = true};
+    seen.wheel[IW_LEFT] = (iw_snapshot_wheel_t){.telemetry = &line, .speed_mm_s = 1500};
+    seen.wheel[IW_RIGHT] = (iw_snapshot_wheel_t){.telemetry = &line, .speed_mm_s = -101, .heard = true};
     gw_record_rolling(&box, &log, &seen);
-    TEST_ASSERT_EQUAL(GW_CHILD_SAID, wait_news());
+    TEST_ASSERT_EQUAL(GW_CHILD_MESSAGE, wait_news());
     TEST_ASSERT_EQUAL(0, box.last.number);
     TEST_ASSERT_EQUAL(0, box.last.error);
     TEST_ASSERT_EQUAL(3, box.stop.number);

@@ -17,7 +17,7 @@ static iw_assumption_store_t *assumptions(void) {
 }
 
 static iw_force_validity_t force_validity(iw_side_t side) {
-    const iw_snapshot_t seen = gateway_rig_look(&rig);
+    const iw_snapshot_t seen = gateway_rig_snapshot(&rig);
     return iw_snapshot_force_validity(&seen, side);
 }
 
@@ -70,7 +70,7 @@ static void know(iw_assumption_state_t state, iw_source_t source, int32_t figure
 }
 
 static void assert_known(iw_assumption_state_t state, iw_source_t source, int32_t figure) {
-    const iw_assumption_entry_t *entry = iw_assumption_entry(assumptions(), IW_ASSUMPTION_MOUNT_SIGN_LEFT);
+    const iw_assumption_entry_t *entry = &assumptions()->entry[IW_ASSUMPTION_MOUNT_SIGN_LEFT];
     TEST_ASSERT_EQUAL_INT(state, entry->state);
     TEST_ASSERT_EQUAL_INT(source, entry->source);
     TEST_ASSERT_EQUAL_INT32(figure, entry->figure);
@@ -145,7 +145,7 @@ TEST(test_force_validity_of_the_right_wheel_uses_its_own_unit) {
     TEST_ASSERT_EQUAL_INT(IW_FORCE_UNIT_CONTRADICTED, force_validity(IW_RIGHT));
 }
 
-static void hear_empty(uint32_t id, uint8_t length) {
+static void receive_empty(uint32_t id, uint8_t length) {
     fake_bus_put_empty(&rig.bus, id, length);
     gateway_rig_step(&rig);
 }
@@ -160,42 +160,42 @@ TEST(test_length_other_than_in_the_table_contradicts_the_dlc) {
             const uint8_t length = (uint8_t)(row->length + off);
             gateway_rig_init(&rig);
             gateway_rig_run(&rig, MS(100));
-            TEST_ASSERT_EQUAL_INT(IW_CONFIRMED, iw_assumption_entry(assumptions(), IW_ASSUMPTION_DLC)->state);
-            hear_empty(row->id, length);
-            TEST_ASSERT_EQUAL_INT(IW_CONTRADICTED, iw_assumption_entry(assumptions(), IW_ASSUMPTION_DLC)->state);
-            TEST_ASSERT_EQUAL_INT32(length, iw_assumption_entry(assumptions(), IW_ASSUMPTION_DLC)->figure);
+            TEST_ASSERT_EQUAL_INT(IW_CONFIRMED, assumptions()->entry[IW_ASSUMPTION_DLC].state);
+            receive_empty(row->id, length);
+            TEST_ASSERT_EQUAL_INT(IW_CONTRADICTED, assumptions()->entry[IW_ASSUMPTION_DLC].state);
+            TEST_ASSERT_EQUAL_INT32(length, assumptions()->entry[IW_ASSUMPTION_DLC].figure);
         }
     }
 }
 
 TEST(test_length_contradiction_is_recorded_once) {
-    hear_empty(IW_ID_LEFT_FORCE, 5);
+    receive_empty(IW_ID_LEFT_FORCE, 5);
     const uint32_t changes = assumptions()->changes;
-    hear_empty(IW_ID_LEFT_FORCE, 6);
-    hear_empty(IW_ID_LEFT_FORCE, 1);
+    receive_empty(IW_ID_LEFT_FORCE, 6);
+    receive_empty(IW_ID_LEFT_FORCE, 1);
     gateway_rig_run(&rig, MS(100));
     TEST_ASSERT_EQUAL_UINT32(changes, assumptions()->changes);
-    TEST_ASSERT_EQUAL_INT32(5, iw_assumption_entry(assumptions(), IW_ASSUMPTION_DLC)->figure);
+    TEST_ASSERT_EQUAL_INT32(5, assumptions()->entry[IW_ASSUMPTION_DLC].figure);
 }
 
 TEST(test_length_of_other_frames_does_not_change_the_dlc) {
-    hear_empty(IW_ID_LEFT_SPEED | IW_CAN_REMOTE, 0);
-    hear_empty(IW_ID_LEFT_SPEED | IW_CAN_EXTENDED, 8);
-    hear_empty(300, 1);
-    hear_empty(IW_ID_LEFT_SETPOINT, 8);
-    TEST_ASSERT_EQUAL_INT(IW_CONFIRMED, iw_assumption_entry(assumptions(), IW_ASSUMPTION_DLC)->state);
+    receive_empty(IW_ID_LEFT_SPEED | IW_CAN_REMOTE, 0);
+    receive_empty(IW_ID_LEFT_SPEED | IW_CAN_EXTENDED, 8);
+    receive_empty(300, 1);
+    receive_empty(IW_ID_LEFT_SETPOINT, 8);
+    TEST_ASSERT_EQUAL_INT(IW_CONFIRMED, assumptions()->entry[IW_ASSUMPTION_DLC].state);
 }
 
 TEST(test_length_of_status_alone_confirms_the_dlc) {
     gateway_rig_init(&rig);
     rig.wheel[IW_LEFT].mute = true;
     rig.wheel[IW_RIGHT].mute = true;
-    hear_empty(IW_ID_LEFT_SPEED, IW_DLC_SPEED);
-    hear_empty(IW_ID_RIGHT_POSE, IW_DLC_POSE);
-    hear_empty(IW_ID_LEFT_FORCE, IW_DLC_FORCE);
-    TEST_ASSERT_EQUAL_INT(IW_ASSUMED, iw_assumption_entry(assumptions(), IW_ASSUMPTION_DLC)->state);
-    hear_empty(IW_ID_LEFT_STATUS, IW_DLC_STATUS);
-    TEST_ASSERT_EQUAL_INT(IW_CONFIRMED, iw_assumption_entry(assumptions(), IW_ASSUMPTION_DLC)->state);
+    receive_empty(IW_ID_LEFT_SPEED, IW_DLC_SPEED);
+    receive_empty(IW_ID_RIGHT_POSE, IW_DLC_POSE);
+    receive_empty(IW_ID_LEFT_FORCE, IW_DLC_FORCE);
+    TEST_ASSERT_EQUAL_INT(IW_ASSUMED, assumptions()->entry[IW_ASSUMPTION_DLC].state);
+    receive_empty(IW_ID_LEFT_STATUS, IW_DLC_STATUS);
+    TEST_ASSERT_EQUAL_INT(IW_CONFIRMED, assumptions()->entry[IW_ASSUMPTION_DLC].state);
 }
 
 TEST(test_assumption_set_as_assumed_changes_nothing) {
@@ -203,7 +203,7 @@ TEST(test_assumption_set_as_assumed_changes_nothing) {
     const uint32_t changes = assumptions()->changes;
     iw_gateway_set_assumption(&rig.gateway, IW_ASSUMPTION_CURRENT_ROLE, &assumed);
     TEST_ASSERT_EQUAL_UINT32(changes, assumptions()->changes);
-    TEST_ASSERT_EQUAL_INT(IW_ASSUMED, iw_assumption_entry(assumptions(), IW_ASSUMPTION_CURRENT_ROLE)->state);
+    TEST_ASSERT_EQUAL_INT(IW_ASSUMED, assumptions()->entry[IW_ASSUMPTION_CURRENT_ROLE].state);
 }
 
 TEST(test_is_sending_from_arm_until_the_zeros_end) {

@@ -102,8 +102,7 @@ TEST(test_gateway_sign_fault_contradicts_with_source_bus) {
     (void)gateway_rig_cruise(&rig, 120, 120, MS(500));
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_FEEDBACK_SIGN, rig.gateway.permit.stop.cause);
     TEST_ASSERT_TRUE(rig.gateway.permit.seen_us[IW_CAUSE_OVERSPEED] == IW_NEVER); // No other cause
-    const iw_assumption_entry_t *const entry =
-        iw_assumption_entry(&rig.gateway.assumptions, IW_ASSUMPTION_FEEDBACK_SIGN_LEFT);
+    const iw_assumption_entry_t *const entry = &rig.gateway.assumptions.entry[IW_ASSUMPTION_FEEDBACK_SIGN_LEFT];
     TEST_ASSERT_EQUAL_INT(IW_CONTRADICTED, entry->state);
     TEST_ASSERT_EQUAL_INT(IW_SOURCE_BUS, entry->source);
 }
@@ -164,7 +163,7 @@ TEST(test_gateway_pair_refused_on_the_left_is_not_sent_right) {
 }
 
 /// Sends force frames of the left wheel for a little more than two seconds, turning at this speed.
-static void hear_force(int16_t raw, int16_t rpm) {
+static void receive_force(int16_t raw, int16_t rpm) {
     const message_t message = {IW_CODEC_FORCE, IW_LEFT, {.force = {.force_raw = raw}}};
     iw_can_frame_t frame;
     rig.wheel[IW_LEFT].rpm_fixed = true;
@@ -179,25 +178,24 @@ static void hear_force(int16_t raw, int16_t rpm) {
 
 TEST(test_gateway_force_is_measured_up_to_rest_rpm) {
     const int16_t rest_rpm = (int16_t)rig.config.rest_rpm;
-    hear_force(100, rest_rpm);
+    receive_force(100, rest_rpm);
     TEST_ASSERT_EQUAL_INT(IW_WINDOW_GOOD, rig.gateway.force[IW_LEFT].quality.window);
     gateway_rig_init(&rig);
-    hear_force(100, (int16_t)(rest_rpm + 1));
+    receive_force(100, (int16_t)(rest_rpm + 1));
     TEST_ASSERT_EQUAL_INT(IW_WINDOW_MOVING, rig.gateway.force[IW_LEFT].quality.window);
 }
 
 TEST(test_gateway_old_force_observation_does_not_replace_operator) {
     const message_t message = {IW_CODEC_OFFSET, IW_LEFT, {.offset = {.offset_dN = 100}}};
-    const iw_assumption_entry_t *const entry =
-        iw_assumption_entry(&rig.gateway.assumptions, IW_ASSUMPTION_FORCE_UNIT_LEFT);
+    const iw_assumption_entry_t *const entry = &rig.gateway.assumptions.entry[IW_ASSUMPTION_FORCE_UNIT_LEFT];
     iw_can_frame_t frame;
     gateway_rig_run(&rig, MS(500));
     (void)message_encode(&message, &frame);
     fake_bus_put(&rig.bus, &frame);
-    hear_force(100, 0);
+    receive_force(100, 0);
     TEST_ASSERT_EQUAL_INT(IW_CONTRADICTED, entry->state);
     iw_assumption_confirm(&rig.gateway.assumptions, IW_ASSUMPTION_FORCE_UNIT_LEFT, IW_SOURCE_OPERATOR, 0);
-    hear_force(100, 0);
+    receive_force(100, 0);
     TEST_ASSERT_EQUAL_INT(IW_CONFIRMED, entry->state);
 }
 

@@ -32,7 +32,7 @@ static void assert_latched(iw_cause_t cause) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, state());
     TEST_ASSERT_EQUAL_INT(cause, stop()->cause);
     TEST_ASSERT_TRUE(stop()->latched);
-    TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+    TEST_ASSERT_TRUE(gateway_rig_commands_zero(&rig));
 }
 
 /// One wheel is offline: from 400 mm/s the common ramp lasts 267 ms.
@@ -40,21 +40,21 @@ static void assert_latched_with_a_ramp(void) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, state());
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_WHEEL_LOST, stop()->cause);
     TEST_ASSERT_FALSE(stop()->at_once);
-    TEST_ASSERT_FALSE(gateway_rig_told_zero(&rig));
+    TEST_ASSERT_FALSE(gateway_rig_commands_zero(&rig));
     TEST_ASSERT_EQUAL_INT(rig.bus.commanded_mm_s[IW_LEFT], rig.bus.commanded_mm_s[IW_RIGHT]);
     gateway_rig_run(&rig, MS(200));
-    TEST_ASSERT_FALSE(gateway_rig_told_zero(&rig));
+    TEST_ASSERT_FALSE(gateway_rig_commands_zero(&rig));
     gateway_rig_run(&rig, MS(100));
     assert_latched(IW_CAUSE_WHEEL_LOST);
 }
 
-static void assert_no_motion_until_armed_anew(void) {
+static void assert_no_motion_until_armed_again(void) {
     (void)gateway_rig_cruise(&rig, 400, 400, MS(300));
     gateway_rig_run(&rig, MS(1100));
     (void)gateway_rig_reset(&rig);
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, state());
     gateway_rig_run(&rig, MS(100));
-    TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+    TEST_ASSERT_TRUE(gateway_rig_commands_zero(&rig));
 }
 
 TEST(test_gateway_estop_in_motion_sends_zeros_in_the_same_step) {
@@ -93,7 +93,7 @@ TEST(test_gateway_estop_edge_alone_latches) {
     rig.bus.estop_edge = true;
     gateway_rig_step(&rig);
     assert_latched(IW_CAUSE_ESTOP_LINE);
-    assert_no_motion_until_armed_anew();
+    assert_no_motion_until_armed_again();
 }
 
 TEST(test_gateway_estop_disagreement_latches_until_they_agree) {
@@ -155,7 +155,7 @@ TEST(test_gateway_software_estop_latches_from_any_client) {
     assert_latched(IW_CAUSE_ESTOP_SOFTWARE);
     TEST_ASSERT_EQUAL_UINT32(OTHER, stop()->detail);
     TEST_ASSERT_EQUAL_INT(400, stop()->applied.wheel[IW_LEFT].speed_mm_s);
-    assert_no_motion_until_armed_anew();
+    assert_no_motion_until_armed_again();
 }
 
 TEST(test_gateway_reset_while_a_client_drives_is_stale) {
@@ -233,6 +233,95 @@ TEST(test_gateway_both_wheels_offline_are_both_named) {
     (void)gateway_rig_cruise(&rig, 400, 400, MS(80));
     assert_latched(IW_CAUSE_WHEEL_LOST);
     TEST_ASSERT_EQUAL_UINT8(IW_SIDES_BOTH, stop()->sides);
+}
+
+/// The wheel sends nothing more, and causes no step any more.
+static void fall_silent(int side) {
+    rig.wheel[side].speed_us = rig.wheel[side].status_us = IW_NEVER;
+}
+
+/// Without frames only the time that the last step returned causes a step, and setpoints are due at other times.
+static void assert_zero_at_the_limit_of(int later, uint32_t phase_us) {
+    drive_on();
+    gateway_rig_run(&rig, phase_us);
+    fall_silent(IW_SIDES - 1 - later);
+    gateway_rig_run(&rig, MS(4));
+    fall_silent(later);
+    const iw_time_us_t limit_us = rig.gateway.wheel[later].received_us + MS(rig.config.wheel_silent_ms);
+    gateway_rig_run(&rig, limit_us + IW_SETPOINT_SPACING_US - rig.now_us);
+    assert_latched(IW_CAUSE_WHEEL_LOST);
+    TEST_ASSERT_LESS_OR_EQUAL_UINT64(limit_us, stop()->at_us);
+}
+
+TEST(test_gateway_both_wheels_offline_latch_at_the_limit) {
+    for (uint32_t phase_us = 0; phase_us < 20000; phase_us += 500) {
+        for (int later = 0; later < IW_SIDES; later++) {
+            setUp();
+            assert_zero_at_the_limit_of(later, phase_us);
+            tearDown();
+        }
+    }
+}
+
+/// The time that a step returns can be the limit of both wheels. A stall from there on is no fault of the wheels.
+TEST(test_gateway_stall_at_the_limit_of_both_wheels_is_excused) {
+    rig.config.wheel_silent_ms = 20;
+    rig.config.period_ms = 50;
+    gateway_rig_begin(&rig, false);
+    drive_on();
+    for (uint32_t ms = 30; ms < 60; ms++) {
+        (void)gateway_rig_drive(&rig, HOLDER, 400, 400);
+        gateway_rig_stall(&rig, MS(ms));
+        (void)gateway_rig_cruise(&rig, 400, 400, MS(100));
+        TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
+    }
+}
+
+/// Only the limit of both wheels excuses both. Here one wheel sends, and a pair is due soon after the limit of the other.
+TEST(test_gateway_stall_after_the_limit_of_one_wheel_is_no_excuse) {
+    int judged = 0;
+    for (uint32_t phase_us = 0; phase_us < 20000; phase_us += 500) {
+        setUp();
+        drive_on();
+        gateway_rig_run(&rig, phase_us);
+        fall_silent(IW_LEFT);
+        const iw_time_us_t limit_us = rig.gateway.wheel[IW_LEFT].received_us + MS(rig.config.wheel_silent_ms);
+        gateway_rig_run(&rig, limit_us - 1U - rig.now_us);
+        if (rig.gateway.promised_us >= limit_us) {
+            judged++;
+            gateway_rig_stall(&rig, MS(25));
+            gateway_rig_run(&rig, MS(20));
+            TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, state());
+            TEST_ASSERT_EQUAL_INT(IW_CAUSE_WHEEL_LOST, stop()->cause);
+        }
+        tearDown();
+    }
+    TEST_ASSERT_GREATER_THAN_INT(3, judged);
+}
+
+/// A stall that begins at the limit of both wheels does not excuse a wheel that was offline a frame earlier.
+TEST(test_gateway_stall_at_the_limit_of_both_is_no_excuse_for_one) {
+    int judged = 0;
+    for (uint32_t step = 0; step < 120; step++) {
+        setUp();
+        drive_on();
+        gateway_rig_run(&rig, step / 3U * 500U);
+        rig.wheel[IW_RIGHT].speed_us = rig.wheel[IW_LEFT].speed_us;
+        fall_silent(IW_LEFT);
+        gateway_rig_run(&rig, MS(4U + step % 3U * 4U));
+        fall_silent(IW_RIGHT);
+        const iw_time_us_t left_us = rig.gateway.wheel[IW_LEFT].received_until_us;
+        const iw_time_us_t right_us = rig.gateway.wheel[IW_RIGHT].received_until_us;
+        gateway_rig_run(&rig, left_us - 1U - rig.now_us);
+        if (rig.gateway.promised_us == right_us && right_us - left_us >= IW_WHEEL_SPEED_PERIOD_US) {
+            judged += (right_us - left_us == IW_WHEEL_SPEED_PERIOD_US) ? 1 : 0;
+            gateway_rig_stall(&rig, MS(35));
+            gateway_rig_run(&rig, MS(20));
+            TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, state());
+        }
+        tearDown();
+    }
+    TEST_ASSERT_GREATER_THAN_INT(3, judged);
 }
 
 /// The last frames showed standstill. If the zeros ended after `zero_hold_ms`, they would rely on frames that no longer
@@ -314,7 +403,7 @@ TEST(test_gateway_blocked_wheel_stops_with_a_ramp_and_no_latch) {
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_WHEEL_BLOCKED, stop()->cause);
     TEST_ASSERT_EQUAL_UINT8(IW_SIDES_LEFT, stop()->sides);
     TEST_ASSERT_EQUAL_UINT32(20, stop()->detail);
-    TEST_ASSERT_FALSE(gateway_rig_told_zero(&rig));
+    TEST_ASSERT_FALSE(gateway_rig_commands_zero(&rig));
 }
 
 TEST(test_gateway_pushed_wheel_while_listening_is_no_fault) {
@@ -348,7 +437,7 @@ TEST(test_gateway_late_by_100_ms_stops_without_a_ramp) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, state());
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_LOOP_LATE, stop()->cause);
     TEST_ASSERT_EQUAL_UINT32(100, stop()->detail);
-    TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+    TEST_ASSERT_TRUE(gateway_rig_commands_zero(&rig));
     TEST_ASSERT_EQUAL_UINT64(rig.now_us, rig.bus.last_us[IW_LEFT]);
 }
 
@@ -368,9 +457,9 @@ TEST(test_gateway_late_step_during_the_ramp_sends_zero) {
     drive_on();
     gateway_rig_stop(&rig);
     gateway_rig_run(&rig, MS(60));
-    TEST_ASSERT_FALSE(gateway_rig_told_zero(&rig));
+    TEST_ASSERT_FALSE(gateway_rig_commands_zero(&rig));
     gateway_rig_stall(&rig, rig.wake_us - rig.now_us + MS(150));
-    TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+    TEST_ASSERT_TRUE(gateway_rig_commands_zero(&rig));
 }
 
 TEST(test_gateway_late_step_does_not_change_the_loss_of_a_wheel) {

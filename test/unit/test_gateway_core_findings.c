@@ -15,7 +15,7 @@ void tearDown(void) {
 }
 
 static const iw_assumption_entry_t *entry(iw_assumption_item_t item) {
-    return iw_assumption_entry(&rig.gateway.assumptions, item);
+    return &rig.gateway.assumptions.entry[item];
 }
 
 static void assert_entry(iw_assumption_item_t item, iw_assumption_state_t state, iw_source_t source) {
@@ -226,8 +226,8 @@ TEST(test_gateway_pose_is_stored_with_its_time) {
     put(&message);
     gateway_rig_step(&rig);
     TEST_ASSERT_EQUAL_UINT64(rig.now_us, rig.gateway.pose_us);
-    TEST_ASSERT_EQUAL_INT(-1, rig.gateway.told[IW_RIGHT].pose.x_mm);
-    TEST_ASSERT_EQUAL_INT(31415, rig.gateway.told[IW_RIGHT].pose.psi_mrad);
+    TEST_ASSERT_EQUAL_INT(-1, rig.gateway.telemetry[IW_RIGHT].pose.x_mm);
+    TEST_ASSERT_EQUAL_INT(31415, rig.gateway.telemetry[IW_RIGHT].pose.psi_mrad);
 }
 
 TEST(test_gateway_driving_confirms_the_feedback_sign_once) {
@@ -264,5 +264,5 @@ TEST(test_gateway_right_frame_stopped_by_envelope_stops_left_too) {
     gateway_rig_run(&rig, MS(20));
     TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, iw_gateway_state(&rig.gateway));
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_INTERNAL, rig.gateway.permit.stop.cause);
-    TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+    TEST_ASSERT_TRUE(gateway_rig_commands_zero(&rig));
 }

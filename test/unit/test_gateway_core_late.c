@@ -13,7 +13,7 @@ void tearDown(void) {
     TEST_ASSERT_NULL_MESSAGE(rig.judge.violation, rig.judge.violation);
 }
 
-static bool told_lost(void) {
+static bool lost_reported(void) {
     return (rig.gateway.permit.present & (1U << IW_CAUSE_WHEEL_LOST)) != 0U;
 }
 
@@ -25,12 +25,12 @@ TEST(test_gateway_late_step_does_not_end_the_loss_of_a_wheel) {
     gateway_rig_run(&rig, MS(500));
     rig.wheel[IW_LEFT].mute = true;
     gateway_rig_run(&rig, MS(200));
-    TEST_ASSERT_TRUE(told_lost());
+    TEST_ASSERT_TRUE(lost_reported());
     for (uint32_t i = 0; i < 5U; i++) {
         stall_by(MS(60));
-        TEST_ASSERT_TRUE(told_lost());
+        TEST_ASSERT_TRUE(lost_reported());
         gateway_rig_step(&rig);
-        TEST_ASSERT_TRUE(told_lost());
+        TEST_ASSERT_TRUE(lost_reported());
     }
 }
 
@@ -38,9 +38,9 @@ TEST(test_gateway_late_step_does_not_lose_an_online_wheel) {
     gateway_rig_run(&rig, MS(500));
     for (uint32_t i = 0; i < 5U; i++) {
         stall_by(MS(60));
-        TEST_ASSERT_FALSE(told_lost());
+        TEST_ASSERT_FALSE(lost_reported());
         gateway_rig_run(&rig, MS(10));
-        TEST_ASSERT_FALSE(told_lost());
+        TEST_ASSERT_FALSE(lost_reported());
     }
 }
 
@@ -84,7 +84,7 @@ TEST(test_gateway_repeated_late_steps_stop_like_one_long_stall) {
     crawl_for(MS(200));
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, iw_gateway_state(&rig.gateway));
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_LOOP_LATE, rig.gateway.permit.stop.cause);
-    TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+    TEST_ASSERT_TRUE(gateway_rig_commands_zero(&rig));
 }
 
 TEST(test_gateway_suspended_in_motion_latches_and_sends_zero) {
@@ -95,7 +95,7 @@ TEST(test_gateway_suspended_in_motion_latches_and_sends_zero) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, iw_gateway_state(&rig.gateway));
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_LOOP_HUNG, rig.gateway.permit.stop.cause);
     TEST_ASSERT_EQUAL_UINT32(5000, rig.gateway.permit.stop.detail);
-    TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+    TEST_ASSERT_TRUE(gateway_rig_commands_zero(&rig));
     gateway_rig_step(&rig);
     TEST_ASSERT_EQUAL_UINT32(1, rig.gateway.counters.late_steps);
 }
@@ -108,7 +108,7 @@ TEST(test_gateway_suspended_for_200_ms_stops) {
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_LOOP_LATE, rig.gateway.permit.stop.cause);
     TEST_ASSERT_EQUAL_UINT32(200, rig.gateway.permit.stop.detail);
     TEST_ASSERT_EQUAL_UINT8(IW_SIDES_NONE, rig.gateway.permit.stop.sides);
-    TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+    TEST_ASSERT_TRUE(gateway_rig_commands_zero(&rig));
 }
 
 TEST(test_gateway_suspended_below_100_ms_continues_to_drive) {
@@ -231,7 +231,7 @@ static void assert_armed_and_still(void) {
     for (unsigned i = 0; i < 50U; i++) {
         gateway_rig_run(&rig, MS(10));
         TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
-        TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+        TEST_ASSERT_TRUE(gateway_rig_commands_zero(&rig));
     }
 }
 

@@ -100,7 +100,7 @@ TEST(test_gateway_delayed_zero_is_sent_with_the_first_echo) {
     TEST_ASSERT_EQUAL_UINT8(2, rig.bus.unechoed[IW_LEFT]);
     gateway_rig_run(&rig, echo_us - rig.now_us);
     TEST_ASSERT_EQUAL_UINT64(echo_us, rig.bus.last_us[IW_LEFT]);
-    TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+    TEST_ASSERT_TRUE(gateway_rig_commands_zero(&rig));
 }
 
 TEST(test_gateway_zero_to_one_wheel_does_not_count_as_a_pair) {
@@ -171,12 +171,12 @@ TEST(test_gateway_hold_ends_after_a_minute_with_a_rolling_wheel) {
     gateway_rig_stop(&rig);
     turn(5);
     gateway_rig_run(&rig, MS(55000));
-    TEST_ASSERT_FALSE(gateway_rig_look(&rig).zeros_ending);
+    TEST_ASSERT_FALSE(gateway_rig_snapshot(&rig).zeros_ending);
     gateway_rig_run(&rig, MS(5200));
-    TEST_ASSERT_TRUE(gateway_rig_look(&rig).zeros_ending);
+    TEST_ASSERT_TRUE(gateway_rig_snapshot(&rig).zeros_ending);
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, state());
     gateway_rig_run(&rig, MS(150));
-    TEST_ASSERT_FALSE(gateway_rig_look(&rig).zeros_ending);
+    TEST_ASSERT_FALSE(gateway_rig_snapshot(&rig).zeros_ending);
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, state());
     TEST_ASSERT_EQUAL_UINT32(1, rig.gateway.permit.still_moving);
 }

@@ -41,7 +41,7 @@ static void assert_diverged(iw_side_t side, bool at_once) {
     TEST_ASSERT_EQUAL_INT(at_once, stop()->at_once);
     TEST_ASSERT_FALSE(stop()->latched);
     TEST_ASSERT_UINT32_WITHIN(2, 61, stop()->detail);
-    TEST_ASSERT_EQUAL_INT(at_once, gateway_rig_told_zero(&rig));
+    TEST_ASSERT_EQUAL_INT(at_once, gateway_rig_commands_zero(&rig));
 }
 
 TEST(test_gateway_one_wheel_blocked_sends_zero_to_both) {
@@ -84,12 +84,12 @@ TEST(test_gateway_wheel_blocked_in_a_ramp_ends_the_ramp) {
     (void)gateway_rig_cruise(&rig, 1000, 1000, MS(2000));
     gateway_rig_stop(&rig);
     gateway_rig_run(&rig, MS(40));
-    TEST_ASSERT_FALSE(gateway_rig_told_zero(&rig));
+    TEST_ASSERT_FALSE(gateway_rig_commands_zero(&rig));
     turn(IW_LEFT, 0);
     gateway_rig_run(&rig, MS(80));
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, state());
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_CLIENT_STOP, stop()->cause);
-    TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+    TEST_ASSERT_TRUE(gateway_rig_commands_zero(&rig));
 }
 
 TEST(test_gateway_too_fast_wheel_in_a_ramp_does_not_end_it) {
@@ -98,7 +98,7 @@ TEST(test_gateway_too_fast_wheel_in_a_ramp_does_not_end_it) {
     turn(IW_LEFT, 49);
     gateway_rig_stop(&rig);
     gateway_rig_run(&rig, MS(420));
-    TEST_ASSERT_FALSE(gateway_rig_told_zero(&rig));
+    TEST_ASSERT_FALSE(gateway_rig_commands_zero(&rig));
     TEST_ASSERT_TRUE(rig.gateway.permit.seen_us[IW_CAUSE_PAIR_DIVERGES] != IW_NEVER);
 }
 
@@ -108,7 +108,7 @@ TEST(test_gateway_pair_pushed_while_listening_is_not_compared) {
     gateway_rig_run(&rig, MS(2000));
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, state());
     TEST_ASSERT_TRUE(rig.gateway.permit.seen_us[IW_CAUSE_PAIR_DIVERGES] == IW_NEVER);
-    TEST_ASSERT_EQUAL_INT32(0, gateway_rig_look(&rig).pair_largest_mm);
+    TEST_ASSERT_EQUAL_INT32(0, gateway_rig_snapshot(&rig).pair_largest_mm);
 }
 
 TEST(test_gateway_pair_pushed_while_armed_stops) {
@@ -150,7 +150,7 @@ TEST(test_gateway_wheel_offline_is_not_compared_by_its_old_speed) {
     (void)gateway_rig_cruise(&rig, 400, 400, MS(70));
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_WHEEL_LOST, stop()->cause);
     gateway_rig_run(&rig, MS(150));
-    TEST_ASSERT_FALSE(gateway_rig_told_zero(&rig));
+    TEST_ASSERT_FALSE(gateway_rig_commands_zero(&rig));
     TEST_ASSERT_EQUAL_INT32(0, rig.gateway.diverge.path_um);
     TEST_ASSERT_TRUE(rig.gateway.permit.seen_us[IW_CAUSE_PAIR_DIVERGES] == IW_NEVER);
 }
@@ -172,7 +172,7 @@ TEST(test_gateway_pair_pushed_during_the_hold_is_not_compared) {
     drive_on();
     gateway_rig_stop(&rig);
     gateway_rig_run(&rig, MS(600));
-    TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+    TEST_ASSERT_TRUE(gateway_rig_commands_zero(&rig));
     turn(IW_LEFT, 20);
     gateway_rig_run(&rig, MS(500));
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, state());
@@ -226,14 +226,14 @@ TEST(test_gateway_deviation_restarts_with_each_drive) {
     turn(IW_LEFT, 0);
     (void)gateway_rig_cruise(&rig, 400, 400, MS(200));
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_PAIR_DIVERGES, stop()->cause);
-    TEST_ASSERT_GREATER_OR_EQUAL_INT32(60, gateway_rig_look(&rig).pair_largest_mm);
+    TEST_ASSERT_GREATER_OR_EQUAL_INT32(60, gateway_rig_snapshot(&rig).pair_largest_mm);
     rig.wheel[IW_LEFT].rpm_fixed = false;
     gateway_rig_run(&rig, MS(3000));
-    TEST_ASSERT_GREATER_OR_EQUAL_INT32(60, gateway_rig_look(&rig).pair_largest_mm);
+    TEST_ASSERT_GREATER_OR_EQUAL_INT32(60, gateway_rig_snapshot(&rig).pair_largest_mm);
     gateway_rig_arm(&rig);
     gateway_rig_step(&rig);
-    TEST_ASSERT_EQUAL_INT32(0, gateway_rig_look(&rig).pair_largest_mm);
-    TEST_ASSERT_EQUAL_INT32(0, gateway_rig_look(&rig).pair_mm);
+    TEST_ASSERT_EQUAL_INT32(0, gateway_rig_snapshot(&rig).pair_largest_mm);
+    TEST_ASSERT_EQUAL_INT32(0, gateway_rig_snapshot(&rig).pair_mm);
 }
 
 TEST(test_gateway_third_divergence_within_a_minute_latches) {
@@ -259,9 +259,9 @@ TEST(test_gateway_second_offline_wheel_ends_the_ramp) {
     (void)gateway_rig_cruise(&rig, 1000, 1000, MS(44));
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_WHEEL_LOST, stop()->cause);
     TEST_ASSERT_EQUAL_UINT8(IW_SIDES_LEFT, stop()->sides);
-    TEST_ASSERT_FALSE(gateway_rig_told_zero(&rig));
+    TEST_ASSERT_FALSE(gateway_rig_commands_zero(&rig));
     gateway_rig_run(&rig, MS(20));
-    TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+    TEST_ASSERT_TRUE(gateway_rig_commands_zero(&rig));
 }
 
 TEST(test_gateway_pair_is_compared_in_the_machine_frame) {
@@ -270,5 +270,5 @@ TEST(test_gateway_pair_is_compared_in_the_machine_frame) {
     drive_on();
     (void)gateway_rig_cruise(&rig, 400, 400, MS(2000));
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
-    TEST_ASSERT_LESS_THAN_INT32(5, gateway_rig_look(&rig).pair_largest_mm);
+    TEST_ASSERT_LESS_THAN_INT32(5, gateway_rig_snapshot(&rig).pair_largest_mm);
 }

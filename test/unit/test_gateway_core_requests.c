@@ -292,7 +292,7 @@ TEST(test_gateway_arm_in_the_zero_hold_continues_without_gap) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_request_arm(&rig, OTHER, false));
     gateway_rig_run(&rig, MS(10));
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
-    TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+    TEST_ASSERT_TRUE(gateway_rig_commands_zero(&rig));
 }
 
 TEST(test_gateway_frames_of_bad_format_refresh_nothing) {
@@ -373,7 +373,7 @@ TEST(test_gateway_shutdown_ramps) {
     gateway_rig_run(&rig, MS(100));
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, state());
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_SHUTDOWN, rig.gateway.permit.stop.cause);
-    TEST_ASSERT_FALSE(gateway_rig_told_zero(&rig));
+    TEST_ASSERT_FALSE(gateway_rig_commands_zero(&rig));
 }
 
 TEST(test_gateway_release_ends_zeros_only_after_the_ramp) {
@@ -386,7 +386,7 @@ TEST(test_gateway_release_ends_zeros_only_after_the_ramp) {
     gateway_rig_stop(&rig);
     gateway_rig_run(&rig, MS(60000));
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, state());
-    TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+    TEST_ASSERT_TRUE(gateway_rig_commands_zero(&rig));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, iw_gateway_release(&rig.gateway));
     gateway_rig_run(&rig, MS(1000));
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, state());

@@ -24,11 +24,11 @@ static void turn(size_t side, int16_t rpm) {
 }
 
 static bool rolls(void) {
-    return gateway_rig_look(&rig).rolling;
+    return gateway_rig_snapshot(&rig).rolling;
 }
 
 static bool is_fault(void) {
-    return gateway_rig_look(&rig).rolling_fault;
+    return gateway_rig_snapshot(&rig).rolling_fault;
 }
 
 TEST(test_gateway_rolling_while_listening_is_detected) {

@@ -87,7 +87,7 @@ TEST(test_gateway_zeros_are_sent_to_each_wheel_that_accepts) {
             TEST_ASSERT_TRUE(rig.now_us - seen_us[side] < MS(60));
         }
     }
-    TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+    TEST_ASSERT_TRUE(gateway_rig_commands_zero(&rig));
     TEST_ASSERT_EQUAL_INT(0, rig.bus.commanded_mm_s[IW_LEFT]);
     TEST_ASSERT_EQUAL_INT(0, rig.bus.commanded_mm_s[IW_RIGHT]);
 }
@@ -105,7 +105,7 @@ TEST(test_gateway_zero_for_right_does_not_wait_for_left) {
     gateway_rig_run(&rig, MS(6));
     TEST_ASSERT_EQUAL_UINT8(2, rig.bus.unechoed[IW_LEFT]);
     TEST_ASSERT_TRUE(rig.bus.unechoed[IW_RIGHT] > 0);
-    TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+    TEST_ASSERT_TRUE(gateway_rig_commands_zero(&rig));
 }
 
 TEST(test_gateway_inverted_wheel_receives_the_negated_speed) {
@@ -142,7 +142,7 @@ TEST(test_gateway_pair_refused_for_one_wheel_is_followed_by_zeros) {
         }
         rig.bus.send_result[side] = 1;
         gateway_rig_run(&rig, MS(6));
-        TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+        TEST_ASSERT_TRUE(gateway_rig_commands_zero(&rig));
         TEST_ASSERT_TRUE(rig.gateway.sender.sent.later > 0);
         TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
         (void)gateway_rig_cruise(&rig, 100, 100, MS(300));
@@ -202,7 +202,7 @@ TEST(test_gateway_bus_down_in_motion_latches_and_sends_zero_first) {
         rig.bus.state = IW_BUS_ACTIVE;
         gateway_rig_step(&rig);
         TEST_ASSERT_EQUAL_UINT32(sent + 2U, rig.bus.sent);
-        TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+        TEST_ASSERT_TRUE(gateway_rig_commands_zero(&rig));
         gateway_rig_run(&rig, MS(3000));
         TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, state());
         tearDown();
@@ -221,9 +221,9 @@ TEST(test_gateway_stop_ramps_then_holds_zeros_then_is_silent) {
     const iw_time_us_t stop_us = rig.now_us;
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, state());
     gateway_rig_run(&rig, MS(150));
-    TEST_ASSERT_FALSE(gateway_rig_told_zero(&rig));
+    TEST_ASSERT_FALSE(gateway_rig_commands_zero(&rig));
     gateway_rig_run(&rig, MS(150));
-    TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+    TEST_ASSERT_TRUE(gateway_rig_commands_zero(&rig));
     gateway_rig_run(&rig, MS(1400));
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, state());
     gateway_rig_run(&rig, MS(400));

@@ -65,12 +65,12 @@ static void arm_in_vain(int purge_result) {
 
 /// Restores the power: nothing that was sent before may reach the wheels.
 static void expect_silence_with_power(void) {
-    const iw_time_us_t told_us[IW_SIDES] = {rig.bus.told_us[IW_LEFT], rig.bus.told_us[IW_RIGHT]};
+    const iw_time_us_t commanded_us[IW_SIDES] = {rig.bus.commanded_us[IW_LEFT], rig.bus.commanded_us[IW_RIGHT]};
     const uint32_t sent = rig.bus.sent;
     set_power(true);
     gateway_rig_run(&rig, MS(3000));
-    TEST_ASSERT_EQUAL_UINT64(told_us[IW_LEFT], rig.bus.told_us[IW_LEFT]);
-    TEST_ASSERT_EQUAL_UINT64(told_us[IW_RIGHT], rig.bus.told_us[IW_RIGHT]);
+    TEST_ASSERT_EQUAL_UINT64(commanded_us[IW_LEFT], rig.bus.commanded_us[IW_LEFT]);
+    TEST_ASSERT_EQUAL_UINT64(commanded_us[IW_RIGHT], rig.bus.commanded_us[IW_RIGHT]);
     TEST_ASSERT_EQUAL_UINT32(sent, rig.bus.sent);
 }
 
@@ -93,7 +93,7 @@ TEST(test_gateway_missing_echo_latches_and_purges) {
     TEST_ASSERT_FALSE(rig.gateway.permit.phase == IW_PHASE_CUT);
     TEST_ASSERT_EQUAL_UINT32(0, rig.gateway.counters.purges);
     TEST_ASSERT_EQUAL_UINT32(sent + 4U, rig.bus.sent);
-    TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+    TEST_ASSERT_TRUE(gateway_rig_commands_zero(&rig));
 }
 
 TEST(test_gateway_purged_frames_are_never_sent) {

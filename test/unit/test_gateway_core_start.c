@@ -54,7 +54,7 @@ TEST(test_gateway_arm_sends_a_zero_pair_and_waits_for_its_echo) {
     gateway_rig_run(&rig, MS(1000));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_request_arm(&rig, HOLDER, false));
     TEST_ASSERT_EQUAL_UINT32(2, rig.bus.sent);
-    TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+    TEST_ASSERT_TRUE(gateway_rig_commands_zero(&rig));
     TEST_ASSERT_EQUAL_INT16(2000, fake_bus_command(&rig.bus.last[IW_LEFT]).current_mA);
     TEST_ASSERT_TRUE(iw_gateway_arming(&rig.gateway));
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, state());
@@ -64,7 +64,7 @@ TEST(test_gateway_arm_sends_a_zero_pair_and_waits_for_its_echo) {
     TEST_ASSERT_FALSE(iw_gateway_arming(&rig.gateway));
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
     TEST_ASSERT_EQUAL_UINT32(2, rig.gateway.counters.echoes);
-    TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+    TEST_ASSERT_TRUE(gateway_rig_commands_zero(&rig));
 }
 
 TEST(test_gateway_arm_requires_both_echoes) {
@@ -83,7 +83,7 @@ TEST(test_gateway_arm_without_echo_is_send_stalled_then_silent) {
     (void)gateway_rig_request_arm(&rig, HOLDER, false);
     gateway_rig_run(&rig, MS(60));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_SEND_STALLED, iw_gateway_arm_refusal(&rig.gateway));
-    TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+    TEST_ASSERT_TRUE(gateway_rig_commands_zero(&rig));
     const uint32_t sent = rig.bus.sent;
     gateway_rig_run(&rig, MS(2000));
     TEST_ASSERT_EQUAL_UINT32(sent, rig.bus.sent);
@@ -126,7 +126,7 @@ TEST(test_gateway_restarted_sends_zeros_then_listens) {
     gateway_rig_begin(&rig, true);
     gateway_rig_step(&rig);
     TEST_ASSERT_EQUAL_UINT32(2, rig.bus.sent);
-    TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+    TEST_ASSERT_TRUE(gateway_rig_commands_zero(&rig));
     gateway_rig_run(&rig, MS(1499));
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, state());
     gateway_rig_run(&rig, MS(2));
@@ -143,7 +143,7 @@ TEST(test_gateway_restarted_without_track_sends_zeros_never_arms) {
     gateway_rig_run(&rig, MS(1400));
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, state());
     TEST_ASSERT_UINT32_WITHIN(4, 140, rig.bus.sent);
-    TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+    TEST_ASSERT_TRUE(gateway_rig_commands_zero(&rig));
     rig.wheel[IW_LEFT].rpm = 0;
     gateway_rig_run(&rig, MS(3000));
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, state());

@@ -70,8 +70,8 @@ static void pivot(bool mirrored, iw_time_us_t for_us) {
 }
 
 static void assert_stands_without_internal(void) {
-    const iw_snapshot_t seen = gateway_rig_look(&rig);
-    TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+    const iw_snapshot_t seen = gateway_rig_snapshot(&rig);
+    TEST_ASSERT_TRUE(gateway_rig_commands_zero(&rig));
     TEST_ASSERT_TRUE(rig.gateway.permit.seen_us[IW_CAUSE_INTERNAL] == IW_NEVER);
     TEST_ASSERT_EQUAL_UINT32(0, seen.stopped);
 }
@@ -92,7 +92,7 @@ TEST(test_gateway_stop_in_the_fastest_pivot_is_no_internal_fault) {
 
 TEST(test_gateway_zero_command_in_a_pivot_needs_the_ramp_only) {
     pivot(true, MS(900));
-    TEST_ASSERT_EQUAL_INT(-270, gateway_rig_look(&rig).applied.wheel[IW_LEFT].speed_mm_s);
+    TEST_ASSERT_EQUAL_INT(-270, gateway_rig_snapshot(&rig).applied.wheel[IW_LEFT].speed_mm_s);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_cruise(&rig, 0, 0, MS(250)));
     assert_stands_without_internal();
 }
@@ -105,7 +105,7 @@ TEST(test_gateway_pivot_in_reverse_passes_the_envelope) {
         TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_cruise(&rig, 900, 400, MS(300)));
     }
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
-    TEST_ASSERT_EQUAL_UINT32(0, gateway_rig_look(&rig).stopped);
+    TEST_ASSERT_EQUAL_UINT32(0, gateway_rig_snapshot(&rig).stopped);
 }
 
 /// The scheduler and the envelope disagree: the envelope stops what the scheduler misses, with zeros in the same step.
@@ -117,7 +117,7 @@ TEST(test_gateway_yaw_too_fast_is_stopped_by_the_envelope) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, iw_gateway_state(&rig.gateway));
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_INTERNAL, rig.gateway.permit.stop.cause);
     TEST_ASSERT_EQUAL_UINT32(IW_ENVELOPE_YAW, rig.gateway.permit.stop.detail);
-    TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+    TEST_ASSERT_TRUE(gateway_rig_commands_zero(&rig));
 }
 
 TEST(test_gateway_yaw_growth_too_fast_is_stopped_by_the_envelope) {
@@ -126,5 +126,5 @@ TEST(test_gateway_yaw_growth_too_fast_is_stopped_by_the_envelope) {
     (void)gateway_rig_cruise(&rig, -200, 200, MS(100));
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_INTERNAL, rig.gateway.permit.stop.cause);
     TEST_ASSERT_EQUAL_UINT32(IW_ENVELOPE_YAW, rig.gateway.permit.stop.detail);
-    TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+    TEST_ASSERT_TRUE(gateway_rig_commands_zero(&rig));
 }

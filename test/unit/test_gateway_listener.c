@@ -106,6 +106,7 @@ TEST(test_socket_folder_writable_by_others_is_refused_with_fix) {
     for (size_t i = 0; i < sizeof modes / sizeof modes[0]; i++) {
         TEST_ASSERT_EQUAL_INT(0, chmod(folder, modes[i]));
         refused_to_prepare(EX_NOPERM, "other users than the directory's owner may write to it", "chmod go-w");
+        assert_said(", or choose another with --socket\n");
     }
 }
 
@@ -222,6 +223,7 @@ TEST(test_socket_link_or_plain_file_at_its_path_is_refused) {
     TEST_ASSERT_EQUAL_INT(EX_UNAVAILABLE, make());
     assert_said("is a symbolic link, which is not followed");
     assert_said("; remove it, or name the real path");
+    TEST_ASSERT_EQUAL_INT(0, strncmp(logged, "iwheel-gateway: socket /", 24));
     TEST_ASSERT_EQUAL_INT(0, unlink(in_folder("gateway.sock")));
     (void)close(open(in_folder("gateway.sock"), O_WRONLY | O_CREAT, 0600));
     TEST_ASSERT_EQUAL_INT(0, prepare());

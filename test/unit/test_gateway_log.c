@@ -57,12 +57,14 @@ TEST(test_log_at_start_names_bus_sockets_estop_and_stop_budget) {
     (void)snprintf(line, sizeof line, "stop budget, gateway killed: %u ms and %u mm at full command, then unknown\n",
                    (unsigned)budget.killed_ms, (unsigned)budget.killed_mm);
     assert_line(line);
-    assert_line("angle budget, zero without ramp: a wheel blocked 16.2 degrees, slow 18.3, at 4700 mm/s2 assumed, not "
-                "measured\n");
-    assert_line("angle budget, ramp: a wheel coasting 40.4 degrees, at 700 mm/s2 assumed, not measured; late by 100 ms "
-                "10.6\n");
     assert_line(
-        "angle budget, unbounded: a wheel running on 106.1 degrees a second; up to 12.5 a second are not detected\n");
+        "angle budget, zero without ramp: the machine turns by 16.2 degrees if a wheel is blocked, by 18.3 if it is "
+        "slow (assumes 4700 mm/s2, not measured)\n");
+    assert_line(
+        "angle budget, ramp: the machine turns by 40.4 degrees if a wheel coasts (assumes 700 mm/s2, not measured), "
+        "by 10.6 if it follows 100 ms late\n");
+    assert_line("angle budget, unbounded: the machine turns by 106.1 degrees per second if only one wheel drives; up "
+                "to 12.5 per second are not detected\n");
     TEST_ASSERT_NULL(strstr(written(), "track_mm"));
     assert_line("iwheel-gateway: warning: setpoint_type or current_role is not configured: arm will be refused; set "
                 "both under [wheels]\n");
@@ -73,14 +75,14 @@ TEST(test_log_at_start_names_bus_sockets_estop_and_stop_budget) {
 TEST(test_log_at_start_calculates_angles_from_track_and_speed) {
     config.core.track_mm = 270;
     gw_report_start(&config, false, false, &people);
-    assert_line("running on 212.2 degrees a second;");
+    assert_line("turns by 212.2 degrees per second if only one wheel drives;");
     config.core.track_mm = 540;
     config.core.max_speed_mm_s = 90;
     gw_report_start(&config, false, false, &people);
-    assert_line("a wheel blocked 3.7 degrees, slow 7.2,");
+    assert_line("turns by 3.7 degrees if a wheel is blocked, by 7.2 if it is slow");
     config.core.decel_mm_s2 = 600;
     gw_report_start(&config, false, false, &people);
-    assert_line("ramp: a wheel coasting 0.0 degrees");
+    assert_line(", ramp: the machine turns by 0.0 degrees if a wheel coasts");
 }
 
 /// Without a configured track nothing is calculated.

@@ -47,8 +47,7 @@ TEST(test_gateway_radius_setpoint_type_is_confirmed_by_any_wheel) {
     for (size_t i = 0; i < RADII; i++) {
         begin(radii[i]);
         world_rig_drive(&rig, 800, 800, 5000);
-        TEST_ASSERT_EQUAL_INT(IW_CONFIRMED,
-                              iw_assumption_entry(&rig.gateway.assumptions, IW_ASSUMPTION_SETPOINT_TYPE)->state);
+        TEST_ASSERT_EQUAL_INT(IW_CONFIRMED, rig.gateway.assumptions.entry[IW_ASSUMPTION_SETPOINT_TYPE].state);
     }
 }
 

@@ -74,7 +74,7 @@ static const char *list(void) {
     return answer.text;
 }
 
-static void assert_says(const char *part) {
+static void assert_contains(const char *part) {
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(answer.text, part), answer.text);
 }
 
@@ -163,7 +163,7 @@ TEST(test_reader_refuses_links_pipes_and_folders) {
     make("secret", 0, 10);
     TEST_ASSERT_EQUAL(0, symlink("secret", path_of("stop-000001-a.log")));
     TEST_ASSERT_EQUAL(IWN_DENIED, ask("stop-000001-a.log", 0));
-    assert_says("symbolic link");
+    assert_contains("symbolic link");
     char other[256];
     (void)snprintf(other, sizeof other, "%s", path_of("secret"));
     TEST_ASSERT_EQUAL(0, link(other, path_of("stop-000002-a.log")));
@@ -208,7 +208,7 @@ TEST(test_reader_pieces_form_the_file_for_every_length) {
             crc = iwn_line_crc(crc, piece, length);
             got += length;
             if (got < sizes[i]) {
-                assert_says("\"file_crc32\":null");
+                assert_contains("\"file_crc32\":null");
             } else {
                 TEST_ASSERT_EQUAL(crc, (uint32_t)number("\"file_crc32\":"));
             }
@@ -220,9 +220,9 @@ TEST(test_reader_pieces_form_the_file_for_every_length) {
 TEST(test_reader_offset_at_end_is_empty_beyond_is_refused) {
     make(LOG, 0, 100);
     TEST_ASSERT_EQUAL(IWN_OK, ask(LOG, 100));
-    assert_says("\"data\":\"\",\"crc32\":0,\"file_crc32\":");
+    assert_contains("\"data\":\"\",\"crc32\":0,\"file_crc32\":");
     TEST_ASSERT_EQUAL(IWN_OUT_OF_RANGE, ask(LOG, 101));
-    assert_says("0 to 100");
+    assert_contains("0 to 100");
     TEST_ASSERT_EQUAL(IWN_OUT_OF_RANGE, ask(LOG, -1));
     TEST_ASSERT_EQUAL(IWN_OUT_OF_RANGE, ask(LOG, INT64_MAX));
     TEST_ASSERT_EQUAL(IWN_OUT_OF_RANGE, ask(LOG, INT64_MIN));
@@ -241,7 +241,7 @@ TEST(test_reader_file_that_changes_between_pieces_is_reported) {
     TEST_ASSERT_EQUAL(IWN_OUT_OF_RANGE, ask(LOG, 10));
     TEST_ASSERT_EQUAL(0, unlink(path_of(LOG)));
     TEST_ASSERT_EQUAL(IWN_DENIED, ask(LOG, 10));
-    assert_says("does not exist");
+    assert_contains("does not exist");
 }
 
 TEST(test_reader_list_has_recordings_only_oldest_first) {
@@ -259,7 +259,7 @@ TEST(test_reader_list_has_recordings_only_oldest_first) {
     TEST_ASSERT_NOT_NULL_MESSAGE(nine, answer.text);
     TEST_ASSERT_NOT_NULL_MESSAGE(ten, answer.text);
     TEST_ASSERT_TRUE(nine < ten);
-    assert_says("\"log_bytes\":30,\"jsonl_bytes\":20,\"conf_bytes\":10}]");
+    assert_contains("\"log_bytes\":30,\"jsonl_bytes\":20,\"conf_bytes\":10}]");
     TEST_ASSERT_NULL(strstr(answer.text, "notes"));
     TEST_ASSERT_NULL(strstr(answer.text, "000011"));
 }
@@ -272,8 +272,8 @@ TEST(test_reader_list_has_the_newest_that_fit_into_a_line) {
     }
     (void)list();
     TEST_ASSERT_NULL(strstr(answer.text, "stop-0000000520-"));
-    assert_says("[{\"name\":\"stop-0000000521-");
-    assert_says("stop-0000000780-");
+    assert_contains("[{\"name\":\"stop-0000000521-");
+    assert_contains("stop-0000000780-");
 }
 
 static gw_box_t box;
@@ -294,9 +294,9 @@ TEST(test_reader_refusal_after_a_longer_reply_has_its_own_length) {
     make(LOG, 0, 3U * GW_BOX_PIECE);
     open_box(2);
     TEST_ASSERT_TRUE(gw_box_ask(&box, &piece));
-    wait_for_answer(GW_CHILD_SAID);
+    wait_for_answer(GW_CHILD_MESSAGE);
     TEST_ASSERT_TRUE(gw_box_ask(&box, &missing));
-    wait_for_answer(GW_CHILD_SAID);
+    wait_for_answer(GW_CHILD_MESSAGE);
     TEST_ASSERT_EQUAL(IWN_DENIED, box.answer.error);
     TEST_ASSERT_EQUAL(box.answer.length, strlen(box.answer.text));
     gw_box_close(&box);
@@ -307,7 +307,7 @@ TEST(test_reader_frozen_process_does_not_block_the_gateway) {
     make(LOG, 0, 3U * GW_BOX_PIECE);
     open_box(2);
     TEST_ASSERT_TRUE(gw_box_ask(&box, &question));
-    wait_for_answer(GW_CHILD_SAID);
+    wait_for_answer(GW_CHILD_MESSAGE);
     TEST_ASSERT_EQUAL(9, box.answer.client);
     TEST_ASSERT_EQUAL(IWN_OK, box.answer.error);
     TEST_ASSERT_EQUAL(0, kill(box.reader.pid, SIGSTOP));
@@ -323,7 +323,7 @@ TEST(test_reader_frozen_process_does_not_block_the_gateway) {
     TEST_ASSERT_FALSE(gw_box_ask(&box, &question)); // Too early
     box.reader.started_us = 0;
     TEST_ASSERT_TRUE(gw_box_ask(&box, &question));
-    wait_for_answer(GW_CHILD_SAID);
+    wait_for_answer(GW_CHILD_MESSAGE);
     gw_box_close(&box);
 }
 

@@ -131,6 +131,21 @@ TEST(test_request_records_from_its_begin_to_its_end) {
     TEST_ASSERT_EQUAL_STRING(CONFIG, read_file("stop-000001-requested.conf"));
 }
 
+TEST(test_request_is_described_with_its_limits) {
+    char text[512];
+    iwn_out_t json;
+    begin();
+    end();
+    iwn_out_init(&json, text, sizeof text);
+    gw_record_write_request(&box, &json);
+    TEST_ASSERT_GREATER_THAN(0, iwn_out_finish(&json));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "\"on\":false,"), text);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "\"ended\":\"request\","), text);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "\"fault\":null,"), text);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "\"most_ms\":600000,"), text);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "\"most_bytes\":16777216"), text);
+}
+
 TEST(test_request_is_on_the_disk_while_it_runs) {
     begin();
     put_frame(2);

@@ -402,7 +402,8 @@ static int open_and_tend(void) {
         const bool alone = !gw_bus_lock_poll(&second.lock, 0);
         (void)!write(ready[1], "", 1);
         (void)!read(go[0], &byte, 1);
-        const bool gives_way = gw_bus_lock_poll(&second.lock, GW_BUS_LOCK_LOOK_US);
+        const bool early = gw_bus_lock_poll(&second.lock, GW_BUS_LOCK_POLL_US - 1U);
+        const bool gives_way = !early && gw_bus_lock_poll(&second.lock, GW_BUS_LOCK_POLL_US);
         const gw_holder_t holder = (alone && gives_way) ? second.lock.holder : (gw_holder_t){.uid = (uid_t)-1};
         (void)!write(ready[1], &holder, sizeof holder);
         _exit(0);
@@ -424,7 +425,7 @@ TEST(test_lock_held_by_another_user_yields_to_root) {
     TEST_ASSERT_EQUAL_INT(sizeof holder, read(ready[0], &holder, sizeof holder));
     TEST_ASSERT_EQUAL_INT(0, holder.uid);
     TEST_ASSERT_EQUAL_INT(getpid(), holder.pid);
-    TEST_ASSERT_FALSE_MESSAGE(gw_bus_lock_poll(&first.lock, GW_BUS_LOCK_LOOK_US), "root yields to no other gateway");
+    TEST_ASSERT_FALSE_MESSAGE(gw_bus_lock_poll(&first.lock, GW_BUS_LOCK_POLL_US), "root yields to no other gateway");
     for (size_t i = 0; i < 2U; i++) {
         (void)close(go[i]);
         (void)close(ready[i]);

@@ -71,7 +71,7 @@ static void check_time_that_was_read_before_is_not_read_again(void) {
     TEST_ASSERT_GREATER_OR_EQUAL_UINT64(due_us, iwl_clock_now_us());
 }
 
-static void check_time_that_is_past_only_looks(void) {
+static void check_time_that_is_past_only_polls(void) {
     TEST_ASSERT_EQUAL_INT(0, wait_until(0U));
     TEST_ASSERT_EQUAL_INT(0, wait_until(1U));
 }
@@ -92,7 +92,7 @@ TEST(test_wakeup_uses_the_requested_time) {
 }
 
 TEST(test_wakeup_with_a_past_time_only_polls) {
-    check_time_that_is_past_only_looks();
+    check_time_that_is_past_only_polls();
 }
 
 TEST(test_wakeup_by_an_event_is_immediate) {
@@ -103,7 +103,7 @@ TEST(test_wakeup_on_an_old_kernel_uses_two_calls) {
     wakeup.two_calls = true;
     check_wakes_at_its_time_and_not_before();
     check_time_that_was_read_before_is_not_read_again();
-    check_time_that_is_past_only_looks();
+    check_time_that_is_past_only_polls();
     check_event_wakes_before_any_time();
 }
 

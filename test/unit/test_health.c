@@ -18,7 +18,7 @@ void setUp(void) {
     health = (gw_health_t){.limits = {.battery_low_dV = 220, .temperature_high_degC = 60}};
     seen.at_us = 10000000U;
     for (unsigned side = 0; side < IW_SIDES; side++) {
-        seen.wheel[side].told = &telemetry[side];
+        seen.wheel[side].telemetry = &telemetry[side];
         telemetry[side].status.battery_dV = 220;
         telemetry[side].status.temperature_degC = 60;
     }
@@ -29,7 +29,7 @@ static void step(iw_time_us_t after_us) {
     for (unsigned side = 0; side < IW_SIDES; side++) {
         seen.wheel[side].status_us = seen.at_us;
     }
-    gw_health_look(&health, &seen);
+    gw_health_check(&health, &seen);
 }
 
 TEST(test_health_at_the_thresholds_is_no_fault) {
@@ -94,7 +94,7 @@ TEST(test_health_unknown_value_changes_nothing) {
     step(0);
     seen.wheel[IW_LEFT].status_us = seen.at_us;
     seen.at_us += GW_HEALTH_FRESH_US + 1U;
-    gw_health_look(&health, &seen); // The value is too old: the time starts again.
+    gw_health_check(&health, &seen); // The value is too old: the time starts again.
     step(GW_HEALTH_US - GW_HEALTH_FRESH_US);
     step(GW_HEALTH_US - 1U);
     TEST_ASSERT_EQUAL_UINT32(0, health.changes);
@@ -102,7 +102,7 @@ TEST(test_health_unknown_value_changes_nothing) {
     TEST_ASSERT_EQUAL_UINT32(1, health.changes);
     seen.wheel[IW_LEFT].status_us = IW_NEVER;
     seen.at_us += 2U * GW_HEALTH_US;
-    gw_health_look(&health, &seen);
+    gw_health_check(&health, &seen);
     TEST_ASSERT_TRUE(health.present[IW_LEFT][GW_BATTERY_LOW]);
 }
 

@@ -18,7 +18,7 @@ void setUp(void) {
 }
 
 /// Receives two seconds of a healthy pair.
-static void hear_healthy(void) {
+static void receive_healthy(void) {
     received.was_up = true;
     received.span_us = 2000000U;
     for (unsigned i = 0; i < IW_CODEC_ROWS; i++) {
@@ -47,7 +47,7 @@ static void expect(const char *check, inspect_verdict_t verdict, const char *tex
 }
 
 TEST(test_inspect_healthy_bus_has_no_finding) {
-    hear_healthy();
+    receive_healthy();
     inspect_bus(&local, &received, &config, &findings);
     expect("left_wheel", INSPECT_OK, "speed 250.0/s, status 25.0/s, force 20.0/s", "");
     expect("right_wheel", INSPECT_OK, "pose 25.0/s", "");
@@ -56,7 +56,7 @@ TEST(test_inspect_healthy_bus_has_no_finding) {
 }
 
 TEST(test_inspect_offline_wheel_fails_without_finding_of_rates) {
-    hear_healthy();
+    receive_healthy();
     for (unsigned i = 0; i < IW_CODEC_ROWS; i++) {
         received.count[i] = (iw_codec_rows[i].side == IW_RIGHT) ? 0U : received.count[i];
     }
@@ -67,7 +67,7 @@ TEST(test_inspect_offline_wheel_fails_without_finding_of_rates) {
 }
 
 TEST(test_inspect_rate_off_by_over_10_percent_warns_with_numbers) {
-    hear_healthy();
+    receive_healthy();
     received.count[inspect_message_of(IW_ID_LEFT_SPEED)] = 236U;
     inspect_bus(&local, &received, &config, &findings);
     expect("rates", INSPECT_WARN, "left speed 256 (0x100): 118.0 a second; the document has 250.0", "termination");
@@ -75,7 +75,7 @@ TEST(test_inspect_rate_off_by_over_10_percent_warns_with_numbers) {
 }
 
 TEST(test_inspect_rate_within_10_percent_or_two_frames_is_ok) {
-    hear_healthy();
+    receive_healthy();
     received.count[inspect_message_of(IW_ID_LEFT_SPEED)] = 450U;
     received.count[inspect_message_of(IW_ID_RIGHT_FORCE)] = 34U;
     inspect_bus(&local, &received, &config, &findings);
@@ -86,14 +86,14 @@ TEST(test_inspect_rate_within_10_percent_or_two_frames_is_ok) {
 }
 
 TEST(test_inspect_missing_message_is_named) {
-    hear_healthy();
+    receive_healthy();
     received.count[inspect_message_of(IW_ID_RIGHT_POSE)] = 0U;
     inspect_bus(&local, &received, &config, &findings);
     expect("rates", INSPECT_WARN, "right pose 290 (0x122): none received", "firmware");
 }
 
 TEST(test_inspect_offsets_may_be_missing_after_a_minute) {
-    hear_healthy();
+    receive_healthy();
     TEST_ASSERT_EQUAL_UINT32(0U, received.count[inspect_message_of(IW_ID_LEFT_OFFSET)]);
     inspect_bus(&local, &received, &config, &findings);
     TEST_ASSERT_NULL(find("rates"));
@@ -102,7 +102,7 @@ TEST(test_inspect_offsets_may_be_missing_after_a_minute) {
 TEST(test_inspect_foreign_setpoints_fail_without_a_gateway) {
     inspect_config_t beside_gateway = config;
     beside_gateway.others_may_send = true;
-    hear_healthy();
+    receive_healthy();
     received.count[inspect_message_of(IW_ID_RIGHT_SETPOINT)] = 3U;
     inspect_bus(&local, &received, &beside_gateway, &findings);
     TEST_ASSERT_NULL(find("second_master"));
@@ -112,7 +112,7 @@ TEST(test_inspect_foreign_setpoints_fail_without_a_gateway) {
 
 TEST(test_inspect_unknown_ids_are_listed_up_to_a_limit) {
     iw_can_frame_t frame = {.id = 0x266U};
-    hear_healthy();
+    receive_healthy();
     inspect_traffic_count(&received, &frame);
     inspect_traffic_count(&received, &frame);
     frame.id = 0x1ABCDEF0U | IW_CAN_EXTENDED;
@@ -144,7 +144,7 @@ TEST(test_inspect_damaged_frames_have_their_own_counts) {
 }
 
 TEST(test_inspect_full_bus_warns) {
-    hear_healthy();
+    receive_healthy();
     received.bits = 1100000U;
     inspect_bus(&local, &received, &config, &findings);
     expect("load", INSPECT_WARN, "55.0 %", "lower ids");
@@ -161,7 +161,7 @@ TEST(test_inspect_bus_that_was_never_up_does_not_judge_wheels) {
 }
 
 TEST(test_inspect_error_passive_bus_warns) {
-    hear_healthy();
+    receive_healthy();
     received.worst = IW_BUS_PASSIVE;
     inspect_bus(&local, &received, &config, &findings);
     expect("bus_state", INSPECT_WARN, "error passive", "termination");
@@ -182,7 +182,7 @@ TEST(test_inspect_bus_off_fails_and_wheels_are_not_judged) {
 }
 
 TEST(test_inspect_past_bus_off_warns_and_wheels_are_judged) {
-    hear_healthy();
+    receive_healthy();
     received.worst = IW_BUS_OFF;
     inspect_bus(&local, &received, &config, &findings);
     expect("bus_state", INSPECT_WARN, "it was bus-off", "termination");
@@ -312,7 +312,7 @@ TEST(test_inspect_estop_levels_have_their_verdicts) {
 
 TEST(test_inspect_full_list_counts_further_failures) {
     for (unsigned i = 0; i < INSPECT_FINDINGS_MAX + 3U; i++) {
-        inspect_say(&findings, "rates", INSPECT_FAIL, "%u", i);
+        inspect_add(&findings, "rates", INSPECT_FAIL, "%u", i);
         inspect_fix(&findings, "fix %u", i);
     }
     TEST_ASSERT_EQUAL_UINT(INSPECT_FINDINGS_MAX, findings.count);

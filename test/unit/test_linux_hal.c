@@ -81,6 +81,14 @@ TEST(test_hal_estop_not_reported_by_the_wait_has_no_edges) {
     TEST_ASSERT_TRUE(was_quiet);
 }
 
+TEST(test_hal_reports_to_the_bus_whether_the_wait_found_it) {
+    const iwl_bus_t *bus = (const iwl_bus_t *)(const void *)&hal.bus;
+    iwl_hal_waited(&hal, (iwl_reported_t){.bus = false, .estop = true});
+    TEST_ASSERT_TRUE(bus->quiet);
+    iwl_hal_waited(&hal, (iwl_reported_t){.bus = true, .estop = false});
+    TEST_ASSERT_FALSE(bus->quiet);
+}
+
 TEST(test_hal_estop_reported_by_the_wait_is_read_fully) {
     iwl_hal_waited(&hal, (iwl_reported_t){false, false});
     iwl_hal_waited(&hal, (iwl_reported_t){false, true});
@@ -103,7 +111,7 @@ TEST(test_hal_last_result_is_stored) {
 
 TEST(test_hal_next_time_is_the_earlier_of_bus_and_estop) {
     iwl_bus_t *bus = (iwl_bus_t *)(void *)&hal.bus;
-    bus->look_us = 200;
+    bus->poll_us = 200;
     estop_due_us = 100;
     TEST_ASSERT_EQUAL_UINT64(100, iwl_hal_next_us(&hal));
     estop_due_us = 300;
@@ -227,7 +235,7 @@ TEST(test_hal_each_contact_is_closed) {
 
 TEST(test_hal_next_time_is_the_earliest_of_bus_and_both_contacts) {
     iwl_bus_t *bus = (iwl_bus_t *)(void *)&hal.bus;
-    bus->look_us = 5000000;
+    bus->poll_us = 5000000;
     estop_due_us = 4000000;
     estop2_due_us = 3000000;
     TEST_ASSERT_EQUAL_UINT64(4000000, iwl_hal_next_us(&hal));
@@ -238,6 +246,6 @@ TEST(test_hal_next_time_is_the_earliest_of_bus_and_both_contacts) {
     TEST_ASSERT_EQUAL_UINT64(1200001, iwl_hal_next_us(&hal));
     estop_due_us = 1100000;
     TEST_ASSERT_EQUAL_UINT64(1100000, iwl_hal_next_us(&hal));
-    bus->look_us = 1000000;
+    bus->poll_us = 1000000;
     TEST_ASSERT_EQUAL_UINT64(1000000, iwl_hal_next_us(&hal));
 }

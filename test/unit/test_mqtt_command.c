@@ -19,7 +19,7 @@ static mqtt_order_t order;
 
 void setUp(void) {
     memset(&judge, 0, sizeof judge);
-    rules = (mqtt_rules_t){BOOT, 300, true, true, "iwheel/w1/reply/"};
+    rules = (mqtt_rules_t){BOOT, 300, true, true, "iwheel/w1/reply/", 0};
 }
 
 static mqtt_verdict_t judge_text(const char *verb, const char *text, uint64_t now_us) {
@@ -33,10 +33,10 @@ static mqtt_verdict_t judge_text(const char *verb, const char *text, uint64_t no
 }
 
 /// Judges a command of `far` with these additional fields.
-static mqtt_verdict_t judge_it(const char *verb, uint64_t told_us, int seq, const char *fields, uint64_t now_us) {
+static mqtt_verdict_t judge_it(const char *verb, uint64_t stamp_us, int seq, const char *fields, uint64_t now_us) {
     char text[512];
     (void)snprintf(text, sizeof text, "{\"from\":\"far\",\"boot\":\"" BOOT "\",\"t_us\":%llu,\"seq\":%d%s}",
-                   (unsigned long long)told_us, seq, fields);
+                   (unsigned long long)stamp_us, seq, fields);
     return judge_text(verb, text, now_us);
 }
 
@@ -60,6 +60,10 @@ TEST(test_command_age_is_judged_to_the_microsecond) {
     TEST_ASSERT_EQUAL(MQTT_LATE, judge_it("drive", NOW_US, 6, "", NOW_US + 300001U));
     TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("stop", NOW_US, 7, ",\"ttl_ms\":100", NOW_US + 100000U));
     TEST_ASSERT_EQUAL(MQTT_LATE, judge_it("stop", NOW_US, 8, ",\"ttl_ms\":100", NOW_US + 100001U));
+    rules.ahead_us = -3600; // A board has a clock of its own.
+    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("stop", NOW_US, 9, "", NOW_US + 1003600U));
+    TEST_ASSERT_EQUAL(MQTT_LATE, judge_it("stop", NOW_US, 10, "", NOW_US + 1003601U));
+    TEST_ASSERT_EQUAL(MQTT_EARLY, judge_it("stop", NOW_US, 11, "", NOW_US + 3599U));
 }
 
 /// Judges a command with properties of MQTT 5.
@@ -219,7 +223,6 @@ TEST(test_command_garbled_is_dropped) {
         "{\"from\":\"far\",\"seq\":1,\"boot\":\"" BOOT "\",\"t_us\":\"1\"}",
         "{\"from\":\"far\",\"seq\":1,\"boot\":\"" BOOT "0\",\"t_us\":1}",
         "{\"from\":\"far\",\"seq\":1,\"boot\":\"" BOOT "\",\"t_us\":-1}",
-        "{\"from\":\"far\",\"seq\":1,\"boot\":\"" BOOT "\",\"t_us\":50000000,\"left_mm_s\":1}",
     };
     for (size_t i = 0; i < sizeof texts / sizeof texts[0]; i++) {
         TEST_ASSERT_EQUAL_MESSAGE(MQTT_GARBLED, judge_text("stop", texts[i], NOW_US), texts[i]);
@@ -228,6 +231,36 @@ TEST(test_command_garbled_is_dropped) {
     TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_it("drive", NOW_US, 1, ",\"left_mm_s\":{\"cmd\":\"arm\"}", NOW_US));
     TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_it("drive", NOW_US, 1, ",\"left_mm_s\":true", NOW_US));
     TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_it("drive", NOW_US, 1, ",\"takeover\":true", NOW_US));
+    TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_it("reset", NOW_US, 1, ",\"stop\":1,\"left_mm_s\":1", NOW_US));
+    TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_it("why", NOW_US, 1, ",\"reason\":\"a\"", NOW_US));
+}
+
+/// The estop with this value as its reason becomes this request.
+static void expect_estop(const char *request, const char *value) {
+    static char text[6000];
+    (void)snprintf(text, sizeof text,
+                   "{\"from\":\"far\",\"boot\":\"" BOOT "\",\"t_us\":50000000,\"seq\":1,\"reason\":%s}", value);
+    TEST_ASSERT_EQUAL_MESSAGE(MQTT_TAKEN, judge_text("estop", text, NOW_US), value);
+    TEST_ASSERT_EQUAL_STRING(request, order.request);
+}
+
+TEST(test_stop_never_refused_by_mqtt_for_a_field_or_its_reason) {
+    char value[5003];
+    char request[300];
+    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("stop", NOW_US, 1, ",\"left_mm_s\":1,\"reason\":[]", NOW_US));
+    TEST_ASSERT_EQUAL_STRING("{\"cmd\":\"stop\"}", order.request);
+    expect_estop("{\"cmd\":\"estop\",\"reason\":\"line one line two\"}", "\"line one\\nline two\"");
+    expect_estop("{\"cmd\":\"estop\",\"reason\":\"a   b\"}", "\"a\\u200eb\",\"key\":{\"cmd\":\"arm\"}");
+    expect_estop("{\"cmd\":\"estop\"}", "\"\"");
+    expect_estop("{\"cmd\":\"estop\"}", "7");
+    expect_estop("{\"cmd\":\"estop\"}", "{\"cmd\":\"arm\"}");
+    memset(value, 'x', sizeof value);
+    value[0] = '"';
+    memcpy(&value[5001], "\"", 2U);
+    (void)snprintf(request, sizeof request, "{\"cmd\":\"estop\",\"reason\":\"%.200s\"}", &value[1]);
+    expect_estop(request, value);
+    memcpy(&value[202], "\"", 2U); // 201 characters.
+    expect_estop(request, value);
 }
 
 TEST(test_command_too_long_is_garbled) {

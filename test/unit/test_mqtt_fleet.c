@@ -55,7 +55,7 @@ TEST(test_fleet_row_has_state_battery_zero_and_unknown_values) {
     receive("iwheel/w1/state", state);
     const char *text = show(fleet_show);
     TEST_ASSERT_NOT_NULL(strstr(text, "online   latched      24.0     -- operator   doubted    0.2.0"));
-    TEST_ASSERT_NOT_NULL(strstr(show(fleet_tell), "\"left_battery_dV\":240,\"right_battery_dV\":null,"));
+    TEST_ASSERT_NOT_NULL(strstr(show(fleet_print), "\"left_battery_dV\":240,\"right_battery_dV\":null,"));
     TEST_ASSERT_NOT_NULL(strstr(shown, "\"cause\":null,\"stop_wall_us\":null,"));
     TEST_ASSERT_NOT_NULL(strstr(shown, "\"heard_ms\":2000}"));
 }
@@ -75,11 +75,11 @@ TEST(test_fleet_stop_has_its_cause_without_control_characters) {
     const char *text = show(fleet_show);
     TEST_ASSERT_NULL(strchr(text, '\033'));
     TEST_ASSERT_NOT_NULL(strstr(text, "wheel_"));
-    TEST_ASSERT_NOT_NULL(strstr(show(fleet_tell), "\"stop_wall_us\":1760000000000000,\"sentence\":\"left wheel\""));
+    TEST_ASSERT_NOT_NULL(strstr(show(fleet_print), "\"stop_wall_us\":1760000000000000,\"sentence\":\"left wheel\""));
 }
 
 static const char *row(void) {
-    return show(fleet_tell);
+    return show(fleet_print);
 }
 
 TEST(test_fleet_last_stop_is_the_latest_received_one_first) {
@@ -121,7 +121,7 @@ TEST(test_fleet_garbage_is_ignored_and_counted) {
     TEST_ASSERT_EQUAL_UINT64(8, fleet.left_out);
     TEST_ASSERT_EQUAL_STRING("", fleet.machines[0].state);
     receive("iwheel/w1/state", "{\"ledger\":7,\"left\":[],\"state\":null}");
-    TEST_ASSERT_NOT_NULL(strstr(show(fleet_tell), "\"state\":null"));
+    TEST_ASSERT_NOT_NULL(strstr(show(fleet_print), "\"state\":null"));
 }
 
 TEST(test_fleet_machines_beyond_the_limit_are_counted_only) {

@@ -15,10 +15,10 @@
 static history_t history;
 static FILE *out;
 static char *printed;
-static size_t told_size;
+static size_t printed_size;
 
 static void begin(history_config_t config) {
-    out = open_memstream(&printed, &told_size);
+    out = open_memstream(&printed, &printed_size);
     config.since_us = (config.since_us > 0) ? config.since_us : EVENING_US;
     config.until_us = (config.until_us > 0) ? config.until_us : EVENING_US + 3600 * SECOND_US;
     TEST_ASSERT_TRUE(history_open(&history, &config, out));
@@ -43,12 +43,12 @@ static const char *text(void) {
 
 /// Adds a stop of w1: boot, number of the event, number of the stop, seconds after EVENING_US of receipt and of
 /// storage.
-static void stop(const char *boot, int number, int stop_number, int heard_s, int stored_s) {
+static void stop(const char *boot, int number, int stop_number, int received_s, int stored_s) {
     char payload[256];
     (void)snprintf(payload, sizeof payload,
                    "{\"id\":\"%s-%d\",\"boot\":\"%s\",\"heard_wall_us\":%lld,\"event\":\"stop\",\"number\":%d,"
                    "\"cause\":\"wheel_lost\",\"sentence\":\"stop number %d\"}",
-                   boot, number, boot, (long long)(EVENING_US + heard_s * SECOND_US), stop_number, stop_number);
+                   boot, number, boot, (long long)(EVENING_US + received_s * SECOND_US), stop_number, stop_number);
     TEST_ASSERT_TRUE(
         history_take(&history, "iwheel/w1/event/stop", payload, strlen(payload), EVENING_US + stored_s * SECOND_US));
 }
@@ -79,7 +79,7 @@ TEST(test_history_doubles_are_dropped_across_bridge_restarts) {
     stop("b", 4, 4, 4, 7);
     TEST_ASSERT_EQUAL_UINT64(4, history.printed);
     TEST_ASSERT_EQUAL_UINT64(3, history.doubled);
-    TEST_ASSERT_EQUAL_UINT64(0, history.missing + history.unheard);
+    TEST_ASSERT_EQUAL_UINT64(0, history.missing + history.stops_missing);
 }
 
 TEST(test_history_gap_in_numbers_is_printed_before_the_next_event) {
@@ -99,9 +99,9 @@ TEST(test_history_gap_in_stops_is_printed_and_counts_from_restart) {
     stop("a", 2, 10, 2, 2);
     TEST_ASSERT_NOT_NULL(strstr(text(), "-- 2 stops before this one are not in the stream"));
     stop("a", 3, 1, 3, 3);
-    TEST_ASSERT_EQUAL_UINT64(2, history.unheard);
+    TEST_ASSERT_EQUAL_UINT64(2, history.stops_missing);
     stop("a", 4, 3, 4, 4);
-    TEST_ASSERT_EQUAL_UINT64(3, history.unheard);
+    TEST_ASSERT_EQUAL_UINT64(3, history.stops_missing);
 }
 
 TEST(test_history_gap_among_hidden_events_is_printed_at_next_stop) {
@@ -119,17 +119,17 @@ TEST(test_history_late_event_is_no_double_and_closes_its_gap) {
     stop("a", 1, 1, 1, 1);
     stop("a", 5, 5, 2, 2);
     TEST_ASSERT_EQUAL_UINT64(3, history.missing);
-    TEST_ASSERT_EQUAL_UINT64(3, history.unheard);
+    TEST_ASSERT_EQUAL_UINT64(3, history.stops_missing);
     stop("a", 3, 3, 1, 3);
     TEST_ASSERT_NOT_NULL(strstr(text(), "stop number 3"));
     stop("a", 3, 3, 1, 3);
     TEST_ASSERT_EQUAL_UINT64(1, history.doubled);
     TEST_ASSERT_EQUAL_UINT64(2, history.missing);
-    TEST_ASSERT_EQUAL_UINT64(2, history.unheard);
+    TEST_ASSERT_EQUAL_UINT64(2, history.stops_missing);
     stop("a", 2, 2, 1, 4);
     stop("a", 4, 4, 1, 4);
     stop("a", 6, 6, 5, 5);
-    TEST_ASSERT_EQUAL_UINT64(0, history.missing + history.unheard);
+    TEST_ASSERT_EQUAL_UINT64(0, history.missing + history.stops_missing);
     TEST_ASSERT_EQUAL_UINT64(6, history.printed);
 }
 
@@ -155,19 +155,19 @@ TEST(test_history_gap_at_the_end_shows_by_info) {
     TEST_ASSERT_NOT_NULL(strstr(printed,
                                 "-- 8 events after its last one here are not in the stream: the broker confirmed "
                                 "them and did not store them; its spool dropped none"));
-    TEST_ASSERT_EQUAL_UINT64(3, history.unheard);
+    TEST_ASSERT_EQUAL_UINT64(3, history.stops_missing);
 }
 
 TEST(test_history_gap_without_any_event_shows_by_info) {
     begin((history_config_t){0});
     info("a", 7, 30, 12, 0, 0);
     history_end(&history);
-    TEST_ASSERT_EQUAL_UINT64(1, history.unheard);
+    TEST_ASSERT_EQUAL_UINT64(1, history.stops_missing);
     tearDown();
     begin((history_config_t){0});
     info("a", 7, -30, 12, 0, 0);
     history_end(&history);
-    TEST_ASSERT_EQUAL_UINT64_MESSAGE(0, history.unheard, "its last stop was before the span");
+    TEST_ASSERT_EQUAL_UINT64_MESSAGE(0, history.stops_missing, "its last stop was before the span");
 }
 
 TEST(test_history_end_without_a_gap_prints_nothing) {

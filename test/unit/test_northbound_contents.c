@@ -32,7 +32,7 @@ static iw_snapshot_t snapshot(void) {
     return seen;
 }
 
-static void assert_says(const char *words) {
+static void assert_contains(const char *words) {
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, words), words);
 }
 
@@ -51,19 +51,19 @@ static void status(void) {
 
 TEST(test_status_without_a_time_of_day_has_null) {
     status();
-    assert_says("\"wall_us\":null");
-    assert_says("\"version\":\"1.2.3\"");
-    assert_says("\"sample_point_permille\":null"); // A value that is not reported is null, not 0.
-    assert_says("\"load_permille\":null");
-    assert_says("\"warnings\":[]");
+    assert_contains("\"wall_us\":null");
+    assert_contains("\"version\":\"1.2.3\"");
+    assert_contains("\"sample_point_permille\":null"); // A value that is not reported is null, not 0.
+    assert_contains("\"load_permille\":null");
+    assert_contains("\"warnings\":[]");
 }
 
 TEST(test_status_before_telemetry_of_a_wheel_has_null_values) {
     status();
-    assert_says("\"left\":{\"heard\":false,\"at_rest\":null,\"speed_rpm\":null,\"speed_mm_s\":null");
-    assert_says("\"battery_dV\":null");
-    assert_says("\"force_net_mN\":null");
-    assert_says("\"offset_age_ms\":null");
+    assert_contains("\"left\":{\"heard\":false,\"at_rest\":null,\"speed_rpm\":null,\"speed_mm_s\":null");
+    assert_contains("\"battery_dV\":null");
+    assert_contains("\"force_net_mN\":null");
+    assert_contains("\"offset_age_ms\":null");
 }
 
 TEST(test_status_holder_without_name_or_process_has_its_number) {
@@ -71,19 +71,19 @@ TEST(test_status_holder_without_name_or_process_has_its_number) {
     (void)gateway_rig_cruise(&rig, 300, 300, 200000U);
     around.holder = (iwn_holder_t){.client = HOLDER};
     status();
-    assert_says("\"lease\":{\"holder\":7,\"name\":null,\"pid\":null,\"remaining_ms\":");
-    assert_says("\"state\":\"armed\"");
-    assert_says("\"commanded_mm_s\":300");
+    assert_contains("\"lease\":{\"holder\":7,\"name\":null,\"pid\":null,\"remaining_ms\":");
+    assert_contains("\"state\":\"armed\"");
+    assert_contains("\"commanded_mm_s\":300");
 }
 
 TEST(test_status_estop_has_its_second_contact_only_if_configured) {
     status();
-    assert_says("\"estop\":{\"line\":\"PA0\",\"state\":\"released\",\"simulated\":false");
+    assert_contains("\"estop\":{\"line\":\"PA0\",\"state\":\"released\",\"simulated\":false");
     around.estop.line2 = "PA1";
     around.estop.pressed_at = "line2";
     around.estop.answer = IW_ESTOP_DISAGREES;
     status();
-    assert_says("\"state\":\"disagrees\",\"line2\":\"PA1\",\"pressed_at\":\"line2\",\"simulated\":false");
+    assert_contains("\"state\":\"disagrees\",\"line2\":\"PA1\",\"pressed_at\":\"line2\",\"simulated\":false");
     around.estop = (iwn_estop_t){.line = "PA0", .present = true};
 }
 
@@ -92,7 +92,7 @@ TEST(test_status_warnings_are_in_order) {
     around.warning[1] = "two";
     around.warnings = 2;
     status();
-    assert_says("\"warnings\":[\"one\",\"two\"]");
+    assert_contains("\"warnings\":[\"one\",\"two\"]");
 }
 
 TEST(test_stop_without_a_time_of_day_has_its_age) {
@@ -104,17 +104,17 @@ TEST(test_stop_without_a_time_of_day_has_its_age) {
     iwn_stop_note_t note = {.stop = *seen.stop, .wall_us = IWN_WALL_UNKNOWN, .sentence = "pressed"};
     iwn_write_stop(&note, rig.now_us, &json);
     finish();
-    assert_says("\"cause\":\"estop_line\"");
-    assert_says("\"wall_us\":null");
-    assert_says("\"age_ms\":499");
+    assert_contains("\"cause\":\"estop_line\"");
+    assert_contains("\"wall_us\":null");
+    assert_contains("\"age_ms\":499");
 }
 
 TEST(test_stop_that_never_happened_has_only_its_number) {
     const iwn_stop_note_t none = {.wall_us = IWN_WALL_UNKNOWN};
     iwn_write_stop(&none, rig.now_us, &json);
     finish();
-    assert_says("\"number\":0,\"cause\":null,\"side\":null,\"detail\":null");
-    assert_says("\"at_us\":null,\"wall_us\":null,\"age_ms\":null");
+    assert_contains("\"number\":0,\"cause\":null,\"side\":null,\"detail\":null");
+    assert_contains("\"at_us\":null,\"wall_us\":null,\"age_ms\":null");
 }
 
 TEST(test_lease_event_has_gained_moved_or_lost) {
@@ -130,7 +130,7 @@ TEST(test_lease_event_has_gained_moved_or_lost) {
         json = iwn_write_event(text, sizeof text, "lease");
         iwn_write_lease(&holder, rows[i].former, &json);
         finish();
-        assert_says(rows[i].words);
+        assert_contains(rows[i].words);
     }
 }
 

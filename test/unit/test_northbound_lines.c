@@ -41,7 +41,7 @@ static void expect_line(const char *text) {
     TEST_ASSERT_NOT_NULL(line);
     TEST_ASSERT_EQUAL_UINT(strlen(text), length);
     TEST_ASSERT_EQUAL_INT(0, memcmp(text, line, length));
-    sock_client_drop_line(&client, length);
+    sock_client_drop_line(&client, client.in, length);
 }
 
 static void expect_no_line(void) {
@@ -97,7 +97,7 @@ TEST(test_client_line_of_4096_bytes_fits_and_4097_are_too_long) {
     TEST_ASSERT_FALSE(sock_client_line_too_long(&client));
     send_text("\n");
     TEST_ASSERT_FALSE(sock_client_line_too_long(&client));
-    sock_client_drop_line(&client, IWN_LINE_MAX);
+    sock_client_drop_line(&client, client.in, IWN_LINE_MAX);
     TEST_ASSERT_EQUAL_UINT(0, client.in_length);
     TEST_ASSERT_EQUAL_INT(IWN_LINE_MAX + 1, (int)send(peer, big, IWN_LINE_MAX + 1U, 0));
     sock_client_read(&client);

@@ -190,7 +190,7 @@ static const char *not_at_rest(void) {
     const iwn_request_t request = {.cmd = IWN_CMD_ARM};
     seen.config = &config;
     for (unsigned side = 0; side < IW_SIDES; side++) {
-        seen.wheel[side].told = &telemetry[side];
+        seen.wheel[side].telemetry = &telemetry[side];
         seen.wheel[side].heard = true;
     }
     iwn_refuse_describe(&moment, &request, IW_REFUSE_NOT_AT_REST, &refusal);

@@ -30,8 +30,8 @@ static void begin_at(iw_time_us_t now_us) {
     memset(telemetry, 0, sizeof telemetry);
     TEST_ASSERT_EQUAL_INT(IW_CONFIG_OK, iw_gateway_init(&gateway, &config, &hal, now_us, false));
     iw_gateway_snapshot(&gateway, now_us, &seen);
-    seen.wheel[IW_LEFT].told = &telemetry[IW_LEFT];
-    seen.wheel[IW_RIGHT].told = &telemetry[IW_RIGHT];
+    seen.wheel[IW_LEFT].telemetry = &telemetry[IW_LEFT];
+    seen.wheel[IW_RIGHT].telemetry = &telemetry[IW_RIGHT];
     iw_observation_init(&observation);
 }
 
@@ -231,7 +231,7 @@ static void reboot(void) {
     seen.wheel[IW_LEFT].reboots++;
 }
 
-static void reboot_untold(void) {
+static void reboot_unreported(void) {
     seen.wheel[IW_LEFT].reboots++;
     seen.wheel[IW_LEFT].status_us = IW_NEVER;
 }
@@ -256,7 +256,7 @@ TEST(test_observation_break_restarts_the_stretch) {
     assert_breaks(slow_frame);
     assert_breaks(turn_back);
     assert_breaks(reboot);
-    assert_breaks(reboot_untold);
+    assert_breaks(reboot_unreported);
 }
 
 TEST(test_observation_reboot_in_the_status_frame_judges_nothing) {

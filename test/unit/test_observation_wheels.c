@@ -13,7 +13,7 @@ void setUp(void) {
 }
 
 static void assert_entry(iw_assumption_item_t item, iw_assumption_state_t state) {
-    const iw_assumption_entry_t *entry = iw_assumption_entry(&rig.gateway.assumptions, item);
+    const iw_assumption_entry_t *entry = &rig.gateway.assumptions.entry[item];
     TEST_ASSERT_EQUAL_INT(state, entry->state);
     if (state != IW_ASSUMED) {
         TEST_ASSERT_EQUAL_INT(IW_SOURCE_BUS, entry->source);
@@ -21,7 +21,7 @@ static void assert_entry(iw_assumption_item_t item, iw_assumption_state_t state)
 }
 
 static int32_t figure(iw_assumption_item_t item) {
-    return iw_assumption_entry(&rig.gateway.assumptions, item)->figure;
+    return rig.gateway.assumptions.entry[item].figure;
 }
 
 TEST(test_observation_wheels_at_standstill_judge_no_assumption) {
@@ -90,10 +90,10 @@ TEST(test_observation_wheels_rotor_rpm_as_wheel_rpm_contradicts) {
 
 TEST(test_observation_wheels_one_bad_stretch_changes_no_verdict) {
     world_rig_drive(&rig, 400, 400, 4000);
-    const iw_assumption_entry_t before = *iw_assumption_entry(&rig.gateway.assumptions, IW_ASSUMPTION_GEAR_RATIO);
+    const iw_assumption_entry_t before = rig.gateway.assumptions.entry[IW_ASSUMPTION_GEAR_RATIO];
     rig.gateway.wheel[IW_LEFT].ticks += 70;
     world_rig_drive(&rig, 400, 400, 8000);
-    TEST_ASSERT_EQUAL_INT(before.state, iw_assumption_entry(&rig.gateway.assumptions, IW_ASSUMPTION_GEAR_RATIO)->state);
+    TEST_ASSERT_EQUAL_INT(before.state, rig.gateway.assumptions.entry[IW_ASSUMPTION_GEAR_RATIO].state);
 }
 
 TEST(test_observation_wheels_isolated_bad_stretches_confirm_ratio) {
@@ -125,8 +125,7 @@ TEST(test_observation_wheels_reboot_or_gap_contradicts_no_ratio) {
         (void)iw_gateway_reset(&rig.gateway, rig.now_us);
         world_rig_drive(&rig, 400, 400, 3000);
     }
-    TEST_ASSERT_NOT_EQUAL(IW_CONTRADICTED,
-                          iw_assumption_entry(&rig.gateway.assumptions, IW_ASSUMPTION_GEAR_RATIO)->state);
+    TEST_ASSERT_NOT_EQUAL(IW_CONTRADICTED, rig.gateway.assumptions.entry[IW_ASSUMPTION_GEAR_RATIO].state);
     TEST_ASSERT_EQUAL_UINT32(4, rig.gateway.wheel[IW_LEFT].reboots);
 }
 
@@ -156,8 +155,6 @@ TEST(test_observation_wheels_do_not_replace_the_operator_source) {
     iw_assumption_confirm(&rig.gateway.assumptions, IW_ASSUMPTION_GEAR_RATIO, IW_SOURCE_OPERATOR, 0);
     iw_assumption_contradict(&rig.gateway.assumptions, IW_ASSUMPTION_POSE_BYTE_ORDER, IW_SOURCE_OPERATOR, 0);
     world_rig_drive(&rig, 400, 400, 5000);
-    TEST_ASSERT_EQUAL_INT(IW_SOURCE_OPERATOR,
-                          iw_assumption_entry(&rig.gateway.assumptions, IW_ASSUMPTION_GEAR_RATIO)->source);
-    TEST_ASSERT_EQUAL_INT(IW_CONTRADICTED,
-                          iw_assumption_entry(&rig.gateway.assumptions, IW_ASSUMPTION_POSE_BYTE_ORDER)->state);
+    TEST_ASSERT_EQUAL_INT(IW_SOURCE_OPERATOR, rig.gateway.assumptions.entry[IW_ASSUMPTION_GEAR_RATIO].source);
+    TEST_ASSERT_EQUAL_INT(IW_CONTRADICTED, rig.gateway.assumptions.entry[IW_ASSUMPTION_POSE_BYTE_ORDER].state);
 }

@@ -53,7 +53,7 @@ static const row_t rows[] = {
 static const iw_state_t state_of[PERMIT_SITUATIONS] = {IW_STATE_LISTENING, IW_STATE_LISTENING, IW_STATE_ARMED,
                                                        IW_STATE_STOPPING,  IW_STATE_STOPPING,  IW_STATE_LATCHED};
 
-static void assert_stop_told(iw_cause_t cause, iw_state_t from, bool latched) {
+static void assert_stop_reported(iw_cause_t cause, iw_state_t from, bool latched) {
     const iw_stop_t *const stop = &rig.permit.stop;
     TEST_ASSERT_EQUAL_INT(cause, stop->cause);
     TEST_ASSERT_EQUAL_INT(from, stop->from);
@@ -71,11 +71,11 @@ static void assert_effect(effect_t effect, const iw_permit_t *before, iw_cause_t
     if (effect == LATCH || effect == LATCH_SILENT) {
         TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, iw_permit_state(&rig.permit));
         TEST_ASSERT_EQUAL_INT((effect == LATCH) ? IW_DEMAND_ZERO : IW_DEMAND_SILENCE, demand);
-        assert_stop_told(cause, iw_permit_state(before), true);
+        assert_stop_reported(cause, iw_permit_state(before), true);
     } else if (effect == RAMP) {
         TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, iw_permit_state(&rig.permit));
         TEST_ASSERT_EQUAL_INT(IW_DEMAND_BRAKE, demand);
-        assert_stop_told(cause, iw_permit_state(before), false);
+        assert_stop_reported(cause, iw_permit_state(before), false);
     } else if (effect == CUT) {
         TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, iw_permit_state(&rig.permit));
         TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, demand);

@@ -316,7 +316,7 @@ TEST(test_permit_restarted_without_any_wheel_ends_the_hold) {
     TEST_ASSERT_EQUAL_UINT32(0, rig.permit.still_moving); // It is unknown whether the wheels move.
 }
 
-static void hear_foreign(uint8_t sides) {
+static void receive_foreign(uint8_t sides) {
     const iw_event_t foreign = {IW_CAUSE_SECOND_MASTER, sides, 42, IW_REACT_BY_CAUSE};
     iw_permit_raise(&rig.permit, &foreign, rig.now_us);
 }
@@ -326,12 +326,12 @@ TEST(test_permit_restarted_ends_zeros_at_the_5th_foreign_setpoint) {
     for (size_t i = 0; i < 2; i++) {
         permit_rig_init_restarted(&rig);
         for (unsigned frame = 0; frame < 2; frame++) {
-            hear_foreign(IW_SIDES_LEFT); // Frames that the dead process left in its controller.
-            hear_foreign(IW_SIDES_RIGHT);
+            receive_foreign(IW_SIDES_LEFT); // Frames that the dead process left in its controller.
+            receive_foreign(IW_SIDES_RIGHT);
             TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, iw_permit_state(&rig.permit));
             TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, iw_permit_demand(&rig.permit));
         }
-        hear_foreign(sides[i]);
+        receive_foreign(sides[i]);
         TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_permit_state(&rig.permit));
         TEST_ASSERT_EQUAL_INT(IW_DEMAND_SILENCE, iw_permit_demand(&rig.permit));
     }

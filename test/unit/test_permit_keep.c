@@ -285,7 +285,7 @@ static void begin_restarted(void) {
     permit_rig_step(&rig);
 }
 
-static void hear_strangers(unsigned frames) {
+static void receive_strangers(unsigned frames) {
     for (unsigned i = 0; i < frames; i++) {
         permit_rig_raise(&rig, IW_CAUSE_SECOND_MASTER);
     }
@@ -294,7 +294,7 @@ static void hear_strangers(unsigned frames) {
 TEST(test_permit_keep_is_resumed_by_a_restart) {
     begin_restarted();
     TEST_ASSERT_FALSE(iw_permit_holding(&rig.permit));
-    hear_strangers(4); // Frames that the dead process had left in its controller.
+    receive_strangers(4); // Frames that the dead process had left in its controller.
     permit_rig_wait(&rig, MS(1500));
     assert_held_for_a_day(IW_STATE_STOPPING);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
@@ -302,7 +302,7 @@ TEST(test_permit_keep_is_resumed_by_a_restart) {
 
 TEST(test_permit_keep_resumed_ends_by_a_second_master) {
     begin_restarted();
-    hear_strangers(5);
+    receive_strangers(5);
     assert_silent(IW_STATE_LISTENING);
     begin_restarted();
     permit_rig_wait(&rig, MS(1500));

@@ -17,6 +17,7 @@
 static uint8_t message[SIZE];
 static uint8_t before[SIZE];
 static size_t length;
+static bool is_of_a_writer; ///< Result of the last call by `finish`.
 
 void setUp(void) {}
 void tearDown(void) {}
@@ -65,7 +66,7 @@ static void finish(bool little) {
     put(0, little);
     rtps_write((uint32_t)(length - 24U), 2, little, message + 22);
     memcpy(before, message, sizeof before);
-    rtps_drop_large_data(message, length);
+    is_of_a_writer = rtps_drop_large_data(message, length);
 }
 
 static unsigned id_at(size_t at, bool little) {
@@ -80,6 +81,7 @@ static void expect_dropped(uint8_t kind, uint8_t second, bool little, bool has_q
     const size_t group = parameter(GROUP, 1000, little);
     const size_t topic = parameter(TOPIC, 1000, little);
     finish(little);
+    TEST_ASSERT_EQUAL(kind == 3U, is_of_a_writer);
     TEST_ASSERT_EQUAL_HEX(NAME, id_at(name, little));
     TEST_ASSERT_EQUAL_HEX(USER, id_at(small, little));
     TEST_ASSERT_EQUAL_HEX(0, id_at(user, little));
@@ -116,7 +118,7 @@ static void test_announced_data_begun_in_first_fragment_becomes_padding(void) {
         memset(message + length, 'x', 1200);
         length += 1200U;
         rtps_write((uint32_t)(length - 24U), 2, true, message + 22);
-        rtps_drop_large_data(message, length);
+        TEST_ASSERT_EQUAL(first == 1U, rtps_drop_large_data(message, length));
         TEST_ASSERT_EQUAL_HEX((first == 1U) ? 0U : USER, id_at(user, true));
     }
 }
@@ -126,6 +128,7 @@ static void test_announced_data_of_a_user_is_untouched(void) {
     (void)parameter(USER, 4000, true);
     finish(true);
     TEST_ASSERT_EQUAL_MEMORY(before, message, sizeof before);
+    TEST_ASSERT_FALSE(is_of_a_writer);
     (void)begin(3, 0, true, false);
     message[length - 3U] = 1; // CDR instead of a list of parameters.
     (void)parameter(USER, 4000, true);
@@ -144,7 +147,7 @@ static void test_announced_message_that_is_cut_or_damaged_is_survived(void) {
         uint8_t *copy = malloc(cut + 1U);
         TEST_ASSERT_NOT_NULL(copy);
         memcpy(copy, before, cut);
-        rtps_drop_large_data(copy, cut);
+        (void)rtps_drop_large_data(copy, cut);
         free(copy);
     }
     for (size_t at = 0; at < length; at++) {
@@ -152,7 +155,7 @@ static void test_announced_message_that_is_cut_or_damaged_is_survived(void) {
         TEST_ASSERT_NOT_NULL(copy);
         memcpy(copy, before, length);
         copy[at] ^= 0xFFU;
-        rtps_drop_large_data(copy, length);
+        (void)rtps_drop_large_data(copy, length);
         free(copy);
     }
 }

@@ -76,7 +76,7 @@ TEST(test_auto_arm_foreign_stop_waits_for_the_service) {
     ros_auto_stopped(&automatic, false);
     ros_auto_stopped(&automatic, true);
     TEST_ASSERT_FALSE(ros_auto_command(&automatic, false, SECOND));
-    ros_auto_told(&automatic);
+    ros_auto_reported(&automatic);
     TEST_ASSERT_TRUE(ros_auto_command(&automatic, false, 3LL * SECOND));
 }
 
@@ -100,7 +100,7 @@ TEST(test_auto_arm_stream_after_an_operator_stop_does_not_request) {
 TEST(test_auto_arm_operator_stop_ends_by_the_service) {
     ros_auto_person_stopped(&automatic);
     TEST_ASSERT_FALSE(ros_auto_command(&automatic, false, 2LL * SECOND));
-    ros_auto_told(&automatic);
+    ros_auto_reported(&automatic);
     TEST_ASSERT_TRUE(ros_auto_command(&automatic, false, 2LL * SECOND + 50000));
 }
 

@@ -203,6 +203,34 @@ TEST(test_snapshot_assumptions_set_measures_and_contradiction) {
     TEST_ASSERT_TRUE(facts.machine.setpoint_current);
 }
 
+TEST(test_snapshot_assumptions_unchanged_are_read_once) {
+    static const char other[] = "{\"event\":\"state\",\"ledger\":{\"track\":{\"value\":\"610\"}}}";
+    static const char longer[] = "{\"event\":\"state\",\"ledger\":{\"track\":{\"value\":\"%s\"},\"%*s\":0}}";
+    static char text[ROS_ASSUMPTIONS_SIZE + 128U];
+    const iwc_message_t first = snapshot();
+    const iwc_message_t second = {.text = other, .length = sizeof other - 1U, .is_event = true};
+    const iwc_message_t empty = {.text = "{}", .length = 2};
+    ros_facts_read_assumptions(&first, &facts.machine);
+    facts.machine.track_mm = 1;
+    ros_facts_read_assumptions(&first, &facts.machine);
+    TEST_ASSERT_EQUAL_INT64(1, facts.machine.track_mm);
+    ros_facts_read_assumptions(&second, &facts.machine);
+    TEST_ASSERT_EQUAL_INT64(610, facts.machine.track_mm);
+    ros_facts_read_assumptions(&first, &facts.machine);
+    TEST_ASSERT_EQUAL_INT64(600, facts.machine.track_mm);
+    facts.machine.track_mm = 1;
+    ros_facts_read_config(&empty, &facts.machine); // The configuration may have other values now.
+    ros_facts_read_assumptions(&first, &facts.machine);
+    TEST_ASSERT_EQUAL_INT64(600, facts.machine.track_mm);
+    for (unsigned i = 0; i < 2U; i++) { // Too long to be stored.
+        const int length =
+            snprintf(text, sizeof text, longer, (i == 0U) ? "620" : "630", (int)ROS_ASSUMPTIONS_SIZE, "");
+        const iwc_message_t seen = {.text = text, .length = (size_t)length, .is_event = true};
+        ros_facts_read_assumptions(&seen, &facts.machine);
+        TEST_ASSERT_EQUAL_INT64((i == 0U) ? 620 : 630, facts.machine.track_mm);
+    }
+}
+
 /// An invented track would turn the machine on every map.
 TEST(test_snapshot_track_not_configured_is_none) {
     static const char unset[] =
@@ -241,7 +269,7 @@ TEST(test_configuration_replaces_values_missing_on_a_board) {
 
 // ---- diagnostics --------------------------------------------------------------------------------------------------
 
-static void expect(ros_tells_t which, ros_level_t level, const char *part) {
+static void expect(ros_report_t which, ros_level_t level, const char *part) {
     ros_diagnose(&facts, which, &status);
     TEST_ASSERT_EQUAL_MESSAGE(level, status.level, status.message);
     if (strstr(status.message, part) == NULL) {
@@ -251,88 +279,88 @@ static void expect(ros_tells_t which, ros_level_t level, const char *part) {
 
 TEST(test_diagnosis_button_never_pressed_is_a_warning) {
     facts.machine.estop_tried = false;
-    expect(ROS_TELLS_ESTOP, ROS_WARN, "never tried on this wiring");
+    expect(ROS_REPORT_ESTOP, ROS_WARN, "never tried on this wiring");
     facts.machine.estop_simulated = true;
-    expect(ROS_TELLS_ESTOP, ROS_OK, "released");
+    expect(ROS_REPORT_ESTOP, ROS_OK, "released");
 }
 
 TEST(test_diagnosis_without_a_fault_is_ok) {
-    for (unsigned i = 0; i < ROS_TELLS; i++) {
-        ros_diagnose(&facts, (ros_tells_t)i, &status);
+    for (unsigned i = 0; i < ROS_REPORTS; i++) {
+        ros_diagnose(&facts, (ros_report_t)i, &status);
         TEST_ASSERT_EQUAL_MESSAGE(ROS_OK, status.level, status.message);
         TEST_ASSERT_TRUE(strlen(status.message) > 5U && strlen(status.name) > 2U);
     }
-    expect(ROS_TELLS_COMMANDS, ROS_OK, "15 Hz");
+    expect(ROS_REPORT_COMMANDS, ROS_OK, "15 Hz");
 }
 
 TEST(test_diagnosis_gateway_offline_is_an_error_others_stale) {
     facts.link = ROS_LINK_GONE;
     (void)snprintf(facts.trouble, sizeof facts.trouble, "no program listens");
-    expect(ROS_TELLS_GATEWAY, ROS_ERROR, "no program listens");
-    expect(ROS_TELLS_LEFT, ROS_STALE, "gone");
+    expect(ROS_REPORT_GATEWAY, ROS_ERROR, "no program listens");
+    expect(ROS_REPORT_LEFT, ROS_STALE, "gone");
     facts.link = ROS_LINK_SILENT;
-    expect(ROS_TELLS_GATEWAY, ROS_ERROR, "does not answer");
-    expect(ROS_TELLS_ESTOP, ROS_STALE, "does not answer");
+    expect(ROS_REPORT_GATEWAY, ROS_ERROR, "does not answer");
+    expect(ROS_REPORT_ESTOP, ROS_STALE, "does not answer");
 }
 
 TEST(test_diagnosis_each_stop_has_its_sentence_and_fix) {
     facts.machine.now.machine = IWC_LATCHED;
     (void)snprintf(facts.machine.stop, sizeof facts.machine.stop, "the left wheel was lost");
-    expect(ROS_TELLS_GATEWAY, ROS_ERROR, "the left wheel was lost; remove the cause, reset");
+    expect(ROS_REPORT_GATEWAY, ROS_ERROR, "the left wheel was lost; remove the cause, reset");
     facts.machine.now.machine = IWC_STOPPING;
-    expect(ROS_TELLS_GATEWAY, ROS_WARN, "stopping: the left wheel was lost");
+    expect(ROS_REPORT_GATEWAY, ROS_WARN, "stopping: the left wheel was lost");
     facts.machine.holding = true;
-    expect(ROS_TELLS_GATEWAY, ROS_WARN,
+    expect(ROS_REPORT_GATEWAY, ROS_WARN,
            "holding: zeros until iwheelctl release or arm; use the parking brake; the stop: "
            "the left wheel was lost");
     facts.machine.holding = false;
     facts.machine.now.machine = IWC_LISTENING;
     facts.machine.rolling = true;
-    expect(ROS_TELLS_GATEWAY, ROS_WARN,
+    expect(ROS_REPORT_GATEWAY, ROS_WARN,
            "a wheel turns although the gateway sends nothing to it: hold the machine, or use its parking brake");
     facts.machine.rolling = false;
     (void)snprintf(facts.machine.estop, sizeof facts.machine.estop, "pressed");
-    expect(ROS_TELLS_ESTOP, ROS_ERROR, "release the button");
+    expect(ROS_REPORT_ESTOP, ROS_ERROR, "release the button");
     (void)snprintf(facts.machine.pressed_at, sizeof facts.machine.pressed_at, "both");
-    expect(ROS_TELLS_ESTOP, ROS_ERROR, "the e-stop is pressed: release the button");
+    expect(ROS_REPORT_ESTOP, ROS_ERROR, "the e-stop is pressed: release the button");
     (void)snprintf(facts.machine.pressed_at, sizeof facts.machine.pressed_at, "line2");
-    expect(ROS_TELLS_ESTOP, ROS_ERROR, "pressed at its contact line2: release the button");
+    expect(ROS_REPORT_ESTOP, ROS_ERROR, "pressed at its contact line2: release the button");
     (void)snprintf(facts.machine.estop, sizeof facts.machine.estop, "disagrees");
-    expect(ROS_TELLS_ESTOP, ROS_ERROR, "two contacts disagree, pressed at line2");
+    expect(ROS_REPORT_ESTOP, ROS_ERROR, "two contacts disagree, pressed at line2");
     (void)snprintf(facts.machine.estop, sizeof facts.machine.estop, "unreadable");
-    expect(ROS_TELLS_ESTOP, ROS_ERROR, "check its wire");
+    expect(ROS_REPORT_ESTOP, ROS_ERROR, "check its wire");
     (void)snprintf(facts.machine.bus, sizeof facts.machine.bus, "down");
-    expect(ROS_TELLS_BUS, ROS_ERROR, "arm again");
+    expect(ROS_REPORT_BUS, ROS_ERROR, "arm again");
     (void)snprintf(facts.machine.bus, sizeof facts.machine.bus, "bus_off");
-    expect(ROS_TELLS_BUS, ROS_ERROR, "arm again");
+    expect(ROS_REPORT_BUS, ROS_ERROR, "arm again");
     (void)snprintf(facts.machine.timing, sizeof facts.machine.timing, "contradicted");
-    expect(ROS_TELLS_TIMING, ROS_ERROR, "62.5 %");
+    expect(ROS_REPORT_TIMING, ROS_ERROR, "62.5 %");
     facts.machine.now.right.heard = false;
-    expect(ROS_TELLS_RIGHT, ROS_ERROR, "power and cable");
+    expect(ROS_REPORT_RIGHT, ROS_ERROR, "power and cable");
     (void)snprintf(facts.machine.contradicted, sizeof facts.machine.contradicted, "track: no");
     expect(ROS_REPORTS_ASSUMPTIONS, ROS_ERROR, "track: no");
 }
 
 TEST(test_diagnosis_commands_report_why_they_do_not_drive) {
     facts.commands.late = 3;
-    expect(ROS_TELLS_COMMANDS, ROS_WARN, "3 commands came too late");
+    expect(ROS_REPORT_COMMANDS, ROS_WARN, "3 commands came too late");
     (void)snprintf(facts.commands.refusal, sizeof facts.commands.refusal, "arm first");
     facts.commands.coming = true;
-    expect(ROS_TELLS_COMMANDS, ROS_WARN, "refused: arm first");
+    expect(ROS_REPORT_COMMANDS, ROS_WARN, "refused: arm first");
     facts.commands.unusable = true;
     facts.commands.bad = 7;
-    expect(ROS_TELLS_COMMANDS, ROS_WARN,
+    expect(ROS_REPORT_COMMANDS, ROS_WARN,
            "no usable numbers (NaN, infinity, or 32 m/s or rad/s and more): dropped, 7 so far");
     facts.commands.coming = false;
-    expect(ROS_TELLS_COMMANDS, ROS_WARN, "3 commands came too late, 7 had no usable numbers");
+    expect(ROS_REPORT_COMMANDS, ROS_WARN, "3 commands came too late, 7 had no usable numbers");
     facts.commands.coming = true;
     facts.commands.unusable = false;
     facts.commands.publishers = 2;
-    expect(ROS_TELLS_COMMANDS, ROS_WARN, "twist_mux");
+    expect(ROS_REPORT_COMMANDS, ROS_WARN, "twist_mux");
     facts.machine.setpoint_current = true;
-    expect(ROS_TELLS_COMMANDS, ROS_WARN, "carries no current");
+    expect(ROS_REPORT_COMMANDS, ROS_WARN, "carries no current");
     facts.drive = false;
-    expect(ROS_TELLS_COMMANDS, ROS_OK, "watching only");
+    expect(ROS_REPORT_COMMANDS, ROS_OK, "watching only");
 }
 
 TEST(test_diagnosis_unmatched_publisher_is_named_with_the_fix) {
@@ -340,16 +368,16 @@ TEST(test_diagnosis_unmatched_publisher_is_named_with_the_fix) {
     *unmatched =
         (ros_unmatched_t){.count = 1, .topic = "/w1/cmd_vel", .policy = "", .wanted = "geometry_msgs/msg/Twist"};
     ros_facts_type_name("ackermann_msgs::msg::dds_::AckermannDrive_", unmatched->type, sizeof unmatched->type);
-    expect(ROS_TELLS_COMMANDS, ROS_WARN,
+    expect(ROS_REPORT_COMMANDS, ROS_WARN,
            "1 publishers of /w1/cmd_vel are not received: one sends ackermann_msgs/msg/AckermannDrive; publish "
            "geometry_msgs/msg/Twist, or set [drive] command = both");
     unmatched->policy = "partition";
-    expect(ROS_TELLS_COMMANDS, ROS_WARN,
+    expect(ROS_REPORT_COMMANDS, ROS_WARN,
            "the QoS policy partition of a publisher of ackermann_msgs/msg/AckermannDrive");
     *unmatched = (ros_unmatched_t){.topic = "/cmd_vel", .elsewhere = "/diff_drive/cmd_vel"};
-    expect(ROS_TELLS_COMMANDS, ROS_OK, "no publisher of /cmd_vel, but /diff_drive/cmd_vel has one: remap it");
+    expect(ROS_REPORT_COMMANDS, ROS_OK, "no publisher of /cmd_vel, but /diff_drive/cmd_vel has one: remap it");
     facts.commands.publishers = 1;
-    expect(ROS_TELLS_COMMANDS, ROS_OK, "15 Hz");
+    expect(ROS_REPORT_COMMANDS, ROS_OK, "15 Hz");
 }
 
 TEST(test_type_name_from_outside_is_cut_and_escaped) {
@@ -383,7 +411,7 @@ TEST(test_estop_unreadable_is_pressed_and_none_is_no_line) {
 }
 
 TEST(test_diagnosis_unknown_values_are_empty) {
-    ros_diagnose(&facts, ROS_TELLS_LEFT, &status);
+    ros_diagnose(&facts, ROS_REPORT_LEFT, &status);
     TEST_ASSERT_EQUAL_STRING("speed_mm_s", status.values[0].key);
     TEST_ASSERT_EQUAL_STRING("", status.values[0].text);
 }

@@ -9,7 +9,7 @@
 
 static ros_settings_t settings;
 static char *messages;
-static size_t told_size;
+static size_t printed_size;
 
 void setUp(void) {
     settings = ros_settings_standard;
@@ -21,7 +21,7 @@ void tearDown(void) {
 }
 
 static int read_text(const char *text) {
-    settings_report_t report = {.name = "f", .err = open_memstream(&messages, &told_size)};
+    settings_report_t report = {.name = "f", .err = open_memstream(&messages, &printed_size)};
     const int result = settings_parse(&ros_settings_form, &report, text, strlen(text), &settings);
     (void)fclose(report.err);
     return result;

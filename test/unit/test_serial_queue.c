@@ -26,7 +26,7 @@ static serial_request_t *put(serial_kind_t kind, uint64_t came_us) {
 
 /// Returns the request that is sent now; NULL: none.
 static serial_request_t *send_next(uint64_t now_us) {
-    serial_request_t *next = serial_queue_next(&queue, false, now_us);
+    serial_request_t *next = serial_queue_next(&queue, now_us);
     if (next != NULL) {
         serial_queue_sent(next, now_us);
     }
@@ -85,31 +85,43 @@ TEST(test_queue_replies_are_in_the_order_of_the_requests) {
     TEST_ASSERT_EQUAL_UINT(3, send_next(NOW)->number);
 }
 
-TEST(test_queue_stop_is_next_and_earlier_motion_is_refused) {
+/// A stop, which the relay sends.
+static serial_request_t *put_stop(void) {
+    serial_request_t *place = serial_queue_place(&queue);
+    *place = (serial_request_t){.state = SERIAL_SENT, .kind = SERIAL_STOPS, .number = ++number, .sent_us = NOW};
+    serial_queue_put(&queue);
+    return place;
+}
+
+TEST(test_queue_earlier_motion_is_refused_at_a_stop) {
     (void)put(SERIAL_ASKS, NOW);
     (void)send_next(NOW);
     const serial_request_t *arm = put(SERIAL_GRANTS, NOW);
     const serial_request_t *drive = put(SERIAL_MOVES, NOW);
-    serial_request_t *stop = put(SERIAL_STOPS, NOW);
+    const serial_request_t *question = put(SERIAL_ASKS, NOW);
+    serial_queue_overtake(&queue, SERIAL_STOPS);
     TEST_ASSERT_EQUAL_INT(SERIAL_ANSWERED, arm->state);
     TEST_ASSERT_EQUAL_INT(SERIAL_ANSWERED, drive->state);
-    TEST_ASSERT_EQUAL_PTR(stop, serial_queue_next(&queue, true, NOW));
+    TEST_ASSERT_EQUAL_INT(SERIAL_WAITING, question->state);
 }
 
-TEST(test_queue_stop_is_sent_after_earlier_queries) {
+TEST(test_queue_stop_is_not_sent_from_the_queue_and_refuses_earlier_motion) {
     (void)put(SERIAL_ASKS, NOW);
     (void)send_next(NOW);
-    serial_request_t *question = put(SERIAL_ASKS, NOW);
-    serial_request_t *stop = put(SERIAL_STOPS, NOW);
-    TEST_ASSERT_EQUAL_PTR(question, send_next(NOW));
-    TEST_ASSERT_EQUAL_PTR(stop, send_next(NOW));
+    const serial_request_t *arm = put(SERIAL_GRANTS, NOW);
+    const serial_request_t *stop = put_stop();
+    TEST_ASSERT_EQUAL_INT(SERIAL_ANSWERED, arm->state);
+    TEST_ASSERT_NULL(send_next(NOW));
+    TEST_ASSERT_EQUAL_UINT(NOW + SERIAL_PATIENCE_US, serial_queue_next_us(&queue, NOW));
+    serial_queue_age(&queue, NOW + SERIAL_PATIENCE_US);
+    TEST_ASSERT_EQUAL_INT(SERIAL_ANSWERED, stop->state);
+    TEST_ASSERT_EQUAL_INT(IWN_INTERNAL, stop->error);
 }
 
 TEST(test_queue_early_reply_waits_for_its_turn) {
     (void)put(SERIAL_ASKS, NOW);
     (void)send_next(NOW);
-    serial_request_t *stop = put(SERIAL_STOPS, NOW);
-    (void)send_next(NOW);
+    const serial_request_t *stop = put_stop();
     TEST_ASSERT_TRUE(serial_queue_take(&queue, stop->number, true, ",\"state\":\"stopping\"}", 20));
     TEST_ASSERT_EQUAL_INT(SERIAL_HELD, stop->state);
     TEST_ASSERT_NULL(serial_queue_answered(&queue));
@@ -117,18 +129,6 @@ TEST(test_queue_early_reply_waits_for_its_turn) {
     serial_queue_drop(&queue);
     TEST_ASSERT_EQUAL_PTR(stop, serial_queue_answered(&queue));
     TEST_ASSERT_EQUAL_STRING_LEN(",\"state\":\"stopping\"}", stop->json, stop->length);
-}
-
-TEST(test_queue_only_a_stop_without_a_reply_is_sent_again) {
-    serial_request_t *drive = put(SERIAL_MOVES, NOW);
-    (void)send_next(NOW);
-    serial_request_t *stop = put(SERIAL_STOPS, NOW);
-    TEST_ASSERT_EQUAL_PTR(stop, send_next(NOW));
-    TEST_ASSERT_NULL(send_next(NOW + SERIAL_AGAIN_US - 1U));
-    TEST_ASSERT_EQUAL_UINT(NOW + SERIAL_AGAIN_US, stop->tried_us + SERIAL_AGAIN_US);
-    TEST_ASSERT_EQUAL_PTR(stop, send_next(NOW + SERIAL_AGAIN_US));
-    TEST_ASSERT_NULL(send_next(NOW + SERIAL_AGAIN_US));
-    TEST_ASSERT_EQUAL_INT(SERIAL_SENT, drive->state);
 }
 
 TEST(test_queue_command_that_waited_too_long_is_refused) {
@@ -155,6 +155,23 @@ TEST(test_queue_lost_reply_delays_the_next_command_by_hold_time) {
     serial_queue_age(&queue, NOW + SERIAL_MOVE_PATIENCE_US);
     TEST_ASSERT_EQUAL_UINT(1, serial_queue_answered(&queue)->number);
     TEST_ASSERT_EQUAL_UINT(1, queue.unanswered);
+}
+
+TEST(test_queue_lost_reply_uses_no_place_after_the_next_one) {
+    const serial_request_t *lost = put(SERIAL_MOVES, NOW);
+    (void)send_next(NOW);
+    const serial_request_t *replaced = put(SERIAL_MOVES, NOW);
+    const serial_request_t *drive = put(SERIAL_MOVES, NOW + HOLD);
+    TEST_ASSERT_EQUAL_PTR(drive, send_next(NOW + HOLD));
+    TEST_ASSERT_TRUE(answered(drive->number));
+    TEST_ASSERT_EQUAL_INT(SERIAL_ANSWERED, lost->state);
+    TEST_ASSERT_EQUAL_INT(IWN_STALE_COMMAND, lost->error);
+    TEST_ASSERT_NOT_NULL(strstr(replaced->reason, "replaced"));
+    for (unsigned i = 0; i < 3U; i++) {
+        TEST_ASSERT_NOT_NULL(serial_queue_answered(&queue));
+        serial_queue_drop(&queue);
+    }
+    TEST_ASSERT_NULL(serial_queue_answered(&queue));
 }
 
 TEST(test_queue_reply_without_a_request_is_rejected) {

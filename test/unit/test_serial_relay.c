@@ -1,204 +1,16 @@
 // SPDX-License-Identifier: MIT
-// The complete loop of the relay with a simulated board: this file replaces time, waits and the port. The sockets are
-// real.
-#include "relay.h"
+// The complete loop of the relay with a simulated board.
+#include "relay_rig.h"
 
-#include "iwheel_linux/clock.h"
-
-#include "unity.h"
-
-#include <errno.h>
 #include <fcntl.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/epoll.h>
-#include <sys/eventfd.h>
 #include <sys/socket.h>
-#include <sys/un.h>
 #include <unistd.h>
 
-#define BOOT    "0123456789abcdef"
-#define EARLY   700000
-#define LATE    900000
-#define STEP_MS 1U
-
-static relay_t relay;
-static serial_settings_t settings;
-static uint64_t now_us;
-static char folder[] = "/tmp/serial_relay_XXXXXX";
-static char to_relay[8192]; // Bytes that the board has written and the relay has not read yet.
-static size_t to_relay_length;
-static char to_board[65536]; // All bytes that the relay has written.
-static size_t to_board_length;
-static bool port_is_full;
-static bool port_is_missing;
-static int client_fd;
-static unsigned step;
-static bool (*script)(void); // Called before each wait; true: the relay ends.
-
-// ---- replacements of the port, the clock and the wait -------------------------------------------------------------
-
-iw_time_us_t iwl_clock_now_us(void) {
-    return now_us;
-}
-
-iw_time_us_t iwl_clock_awake_us(iw_time_us_t suspended_us) {
-    return now_us - suspended_us;
-}
-
-iw_time_us_t iwl_clock_read(iw_time_us_t *out_suspended_us) {
-    *out_suspended_us = 0;
-    return now_us;
-}
-
-iw_time_us_t iwl_clock_suspended_us(void) {
-    return 0;
-}
-
-int64_t iwl_clock_wall_us(void) {
-    return (int64_t)now_us;
-}
-
-int serial_port_open(serial_port_t *self, const char *path, uint32_t baud, char *out_why, size_t size) {
-    (void)path;
-    (void)baud;
-    if (port_is_missing) {
-        (void)snprintf(out_why, size, "port: plug the board in");
-        self->fd = -1;
-        return ENOENT;
-    }
-    self->fd = eventfd(0, EFD_CLOEXEC);
-    return 0;
-}
-
-void serial_port_close(serial_port_t *self) {
-    if (self->fd >= 0) {
-        (void)close(self->fd);
-    }
-    self->fd = -1;
-}
-
-ssize_t serial_port_read(const serial_port_t *self, char *out, size_t size) {
-    const size_t count = (to_relay_length < size) ? to_relay_length : size;
-    (void)self;
-    memcpy(out, to_relay, count);
-    memmove(to_relay, &to_relay[count], to_relay_length - count);
-    to_relay_length -= count;
-    return (ssize_t)count;
-}
-
-ssize_t serial_port_write(const serial_port_t *self, const char *bytes, size_t length) {
-    (void)self;
-    if (port_is_full) {
-        return 0;
-    }
-    TEST_ASSERT_TRUE(to_board_length + length < sizeof to_board);
-    memcpy(&to_board[to_board_length], bytes, length);
-    to_board_length += length;
-    to_board[to_board_length] = '\0';
-    return (ssize_t)length;
-}
-
-void serial_port_discard(const serial_port_t *self) {
-    (void)self;
-}
-
-bool serial_port_has_baud(uint32_t baud) {
-    return baud > 0U;
-}
-
-int sock_wakeup_open(sock_wakeup_t *self) {
-    self->fd = epoll_create1(EPOLL_CLOEXEC);
-    return 0;
-}
-
-void sock_wakeup_close(sock_wakeup_t *self) {
-    (void)close(self->fd);
-}
-
-int sock_wakeup_wait(const sock_wakeup_t *self, struct epoll_event *events, int max, iw_time_us_t read_us,
-                     iw_time_us_t until_us) {
-    (void)read_us;
-    (void)until_us;
-    now_us += STEP_MS * 1000U;
-    const bool ends = script();
-    step++;
-    int count = epoll_wait(self->fd, events, max - 2, 0);
-    if (to_relay_length > 0U) {
-        events[count++] = (struct epoll_event){.events = EPOLLIN, .data = {.u64 = SOCK_TAG_BUS}};
-    }
-    if (ends) {
-        events[count++] = (struct epoll_event){.events = EPOLLIN, .data = {.u64 = SOCK_TAG_SIGNAL}};
-    }
-    return count;
-}
-
-// ---- the board and a client ---------------------------------------------------------------------------------------
-
-static void board_writes(uint8_t channel, uint64_t t_us, const char *json) {
-    const iwn_line_t line = {.channel = channel, .stamped = true, .t_us = t_us, .json = json, .length = strlen(json)};
-    to_relay_length += iwn_line_write(&line, &to_relay[to_relay_length], sizeof to_relay - to_relay_length);
-}
-
-static void board_links(uint64_t t_us) {
-    board_writes(0, t_us, "{\"event\":\"link\",\"boot\":\"" BOOT "\",\"version\":\"1\"}");
-}
-
-static void connect_to(const char *path) {
-    struct sockaddr_un address = {.sun_family = AF_UNIX};
-    (void)snprintf(address.sun_path, sizeof address.sun_path, "%s", path);
-    client_fd = socket(AF_UNIX, SOCK_STREAM, 0);
-    TEST_ASSERT_EQUAL_INT(0, connect(client_fd, (struct sockaddr *)&address, sizeof address));
-}
-
-static void client_connects(void) {
-    connect_to(settings.northbound.socket);
-}
-
-static void client_writes(const char *line) {
-    TEST_ASSERT_EQUAL_INT(strlen(line), write(client_fd, line, strlen(line)));
-}
-
-static unsigned count_in(const char *text, const char *words) {
-    unsigned count = 0;
-    for (const char *at = text; (at = strstr(at, words)) != NULL; at++) {
-        count++;
-    }
-    return count;
-}
-
-static unsigned written(const char *words) {
-    return count_in(to_board, words);
-}
-
-static void run(bool (*play)(void)) {
-    script = play;
-    TEST_ASSERT_EQUAL_INT(0, relay_run(&relay, &settings));
-}
-
-void setUp(void) {
-    now_us = 10000000;
-    to_relay_length = to_board_length = 0;
-    to_board[0] = '\0';
-    port_is_full = port_is_missing = false;
-    client_fd = -1;
-    step = 0;
-    settings = serial_settings_standard;
-    settings.northbound.group[0] = '\0';
-    settings.northbound.mode = 0600;
-    (void)snprintf(settings.northbound.socket, sizeof settings.northbound.socket, "%s/drive", folder);
-    (void)snprintf(settings.northbound.watch_socket, sizeof settings.northbound.watch_socket, "none");
-}
-
-void tearDown(void) {
-    if (client_fd >= 0) {
-        (void)close(client_fd);
-    }
-}
-
-// ---- tests --------------------------------------------------------------------------------------------------------
+#define LATE 900000
 
 /// The client disconnects while the line is full, before its `open` could be written.
 static bool client_goes_before_open(void) {
@@ -356,8 +168,6 @@ static void test_relay_watcher_may_stop_and_not_arm(void) {
     TEST_ASSERT_GREATER_OR_EQUAL_UINT_MESSAGE(1, written("\"cmd\":\"stop\""), to_board);
 }
 
-static char received[1024];
-
 /// An event for the previous client arrives on the channel before the hello.
 static bool event_before_hello(void) {
     switch (step) {
@@ -387,6 +197,33 @@ static void test_relay_event_before_hello_is_dropped(void) {
     run(event_before_hello);
     TEST_ASSERT_EQUAL_STRING("{\"event\":\"hello\"}\n", received);
     TEST_ASSERT_GREATER_OR_EQUAL_UINT_MESSAGE(1, written("\"cmd\":\"alive\""), to_board);
+}
+
+/// The greeting of the previous client arrives before the open of this one could be written.
+static bool hello_before_open(void) {
+    switch (step) {
+    case 2:
+        board_links(EARLY);
+        break;
+    case 10:
+        relay.free_us = now_us + 50000U;
+        client_connects();
+        break;
+    case 20:
+        board_writes(1, EARLY + 1, "{\"event\":\"hello\"}");
+        break;
+    case 30:
+        client_receives();
+        break;
+    default:
+        break;
+    }
+    return step == 40U;
+}
+
+static void test_relay_hello_before_open_is_dropped(void) {
+    run(hello_before_open);
+    TEST_ASSERT_EQUAL_STRING("", received);
 }
 
 /// The clock of the board decreases: the board has restarted, whatever it sends.
@@ -421,29 +258,11 @@ static void test_relay_log_without_a_reader_does_not_end_the_relay(void) {
     (void)close(ends[0]);
     (void)dup2(ends[1], STDERR_FILENO);
     (void)signal(SIGPIPE, SIG_DFL);
-    script = board_comes;
-    const int code = relay_run(&relay, &settings);
+    const int code = run_code(board_comes);
     (void)dup2(saved, STDERR_FILENO);
     (void)close(saved);
     (void)close(ends[1]);
     TEST_ASSERT_EQUAL_INT(0, code);
-}
-
-static int guest_fd = -1; ///< Connects when every place is in use.
-static char guest_got[512];
-
-static void guest_says(const char *line) {
-    const int owner = client_fd;
-    client_connects();
-    guest_fd = client_fd;
-    client_fd = owner;
-    TEST_ASSERT_EQUAL_INT(strlen(line), write(guest_fd, line, strlen(line)));
-}
-
-static void guest_reads(void) {
-    const ssize_t length = recv(guest_fd, guest_got, sizeof guest_got - 1U, MSG_DONTWAIT);
-    guest_got[(length > 0) ? length : 0] = '\0';
-    (void)close(guest_fd);
 }
 
 /// The only place is in use, and a stop arrives on another connection.
@@ -459,7 +278,7 @@ static bool stop_beyond_the_places(void) {
         board_writes(1, EARLY + 1, "{\"event\":\"hello\"}");
         break;
     case 30:
-        guest_says("{\"cmd\":\"stop\",\"id\":\"guest\"}\n");
+        guest_sends("{\"cmd\":\"stop\",\"id\":\"guest\"}\n");
         break;
     case 40:
         TEST_ASSERT_EQUAL_UINT_MESSAGE(1, written("\"cmd\":\"stop\""), to_board);
@@ -469,7 +288,7 @@ static bool stop_beyond_the_places(void) {
         guest_reads();
         TEST_ASSERT_NOT_NULL_MESSAGE(strstr(guest_got, "{\"id\":\"guest\",\"ok\":true,\"state\":\"stopping\"}"),
                                      guest_got);
-        guest_says("{\"cmd\":\"reset\",\"id\":\"guest\"}\n");
+        guest_sends("{\"cmd\":\"reset\",\"id\":\"guest\"}\n");
         break;
     case 80:
         guest_reads();
@@ -501,8 +320,7 @@ static void run_logged(bool (*play)(void)) {
     const int saved = dup(STDERR_FILENO);
     const int file = open(path, O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
     (void)dup2(file, STDERR_FILENO);
-    script = play;
-    const int code = relay_run(&relay, &settings);
+    const int code = run_code(play);
     (void)dup2(saved, STDERR_FILENO);
     (void)close(saved);
     const ssize_t length = pread(file, complaints, sizeof complaints - 1U, 0);
@@ -517,7 +335,7 @@ static unsigned logged(const char *words) {
 }
 
 /// A client that connects at this step receives this text.
-static void assert_told_at(unsigned at, const char *words) {
+static void assert_reported_at(unsigned at, const char *words) {
     if (step == at) {
         client_connects();
     }
@@ -542,9 +360,9 @@ static bool noise_after_nothing(void) {
     if (step >= 5100U && step % 100U == 0U) {
         device_sends("login: \n");
     }
-    assert_told_at(2600, "nothing comes");
-    assert_told_at(5100, "baud rate is not");
-    assert_told_at(7600, "another protocol");
+    assert_reported_at(2600, "nothing comes");
+    assert_reported_at(5100, "baud rate is not");
+    assert_reported_at(7600, "another protocol");
     return step == 9000U;
 }
 
@@ -557,7 +375,7 @@ static void test_relay_reason_follows_the_received_bytes(void) {
 
 /// The port does not exist.
 static bool port_stays_away(void) {
-    assert_told_at(4000, "plug the board in");
+    assert_reported_at(4000, "plug the board in");
     return step == 4100U;
 }
 
@@ -576,7 +394,7 @@ static bool board_restarts_late(void) {
     if (step == 5000U) {
         board_writes(1, 5, "{\"event\":\"state\"}");
     }
-    assert_told_at(7400, "has restarted");
+    assert_reported_at(7400, "has restarted");
     return step == 7600U;
 }
 
@@ -599,13 +417,13 @@ static void test_relay_board_offline_is_logged_each_time(void) {
 
 int main(void) {
     UNITY_BEGIN();
-    TEST_ASSERT_NOT_NULL(mkdtemp(folder));
     RUN_TEST(test_relay_client_disconnected_before_open_leaves_none_open);
     RUN_TEST(test_relay_closes_a_channel_before_it_opens_the_next);
     RUN_TEST(test_relay_command_quotes_the_stamp_before_its_wake_up);
     RUN_TEST(test_relay_arm_during_a_stall_is_not_sent);
     RUN_TEST(test_relay_watcher_may_stop_and_not_arm);
     RUN_TEST(test_relay_event_before_hello_is_dropped);
+    RUN_TEST(test_relay_hello_before_open_is_dropped);
     RUN_TEST(test_relay_client_is_closed_by_a_restart_of_the_board);
     RUN_TEST(test_relay_log_without_a_reader_does_not_end_the_relay);
     RUN_TEST(test_stop_never_refused_by_a_relay_without_a_place);
@@ -613,6 +431,5 @@ int main(void) {
     RUN_TEST(test_relay_missing_port_is_not_reported_as_no_bytes);
     RUN_TEST(test_relay_board_restarted_late_is_reported_as_no_bytes);
     RUN_TEST(test_relay_board_offline_is_logged_each_time);
-    (void)rmdir(folder);
     return UNITY_END();
 }

@@ -10,7 +10,7 @@
 #define PLACE(member)                                                                                                  \
     { offsetof(iw_snapshot_t, member), sizeof(((iw_snapshot_t *)0)->member), #member }
 #define PLACES_OF_WHEEL(side)                                                                                          \
-    PLACE(wheel[side].told), PLACE(wheel[side].force), PLACE(wheel[side].speed_us), PLACE(wheel[side].status_us),      \
+    PLACE(wheel[side].telemetry), PLACE(wheel[side].force), PLACE(wheel[side].speed_us), PLACE(wheel[side].status_us), \
         PLACE(wheel[side].ticks), PLACE(wheel[side].nm_per_tick), PLACE(wheel[side].speed_mm_s),                       \
         PLACE(wheel[side].um_s_per_rpm), PLACE(wheel[side].reboots), PLACE(wheel[side].heard),                         \
         PLACE(wheel[side].at_rest)
@@ -46,7 +46,7 @@ void tearDown(void) {
 
 static void assert_wheel(const iw_snapshot_wheel_t *seen, iw_side_t side, iw_time_us_t now_us) {
     const iw_wheel_t *wheel = &rig.gateway.wheel[side];
-    TEST_ASSERT_EQUAL_PTR(&rig.gateway.told[side], seen->told);
+    TEST_ASSERT_EQUAL_PTR(&rig.gateway.telemetry[side], seen->telemetry);
     TEST_ASSERT_EQUAL_PTR(&rig.gateway.force[side], seen->force);
     TEST_ASSERT_EQUAL_UINT64(wheel->speed_us, seen->speed_us);
     TEST_ASSERT_EQUAL_UINT64(wheel->status_us, seen->status_us);
@@ -110,7 +110,7 @@ static void assert_rest(const iw_snapshot_t *seen) {
 
 /// Takes two snapshots into structs with different contents: every field must be equal, and equal to the state of the
 /// parts.
-static iw_snapshot_t look_at(iw_time_us_t now_us) {
+static iw_snapshot_t snapshot_at(iw_time_us_t now_us) {
     iw_snapshot_t seen;
     iw_snapshot_t again;
     memset(&seen, FIXTURE_POISON, sizeof seen);
@@ -132,7 +132,7 @@ static iw_snapshot_t look_at(iw_time_us_t now_us) {
 }
 
 static iw_snapshot_t snapshot(void) {
-    return look_at(rig.now_us);
+    return snapshot_at(rig.now_us);
 }
 
 static void put(iw_codec_kind_t kind, iw_side_t side, const iw_codec_wheel_t *as) {
@@ -191,9 +191,9 @@ TEST(test_snapshot_listening_has_telemetry_and_its_time) {
     put(IW_CODEC_FORCE, IW_RIGHT, &force);
     put(IW_CODEC_POSE, IW_RIGHT, &pose);
     gateway_rig_step(&rig);
-    const iw_snapshot_t seen = look_at(rig.now_us + 50U);
+    const iw_snapshot_t seen = snapshot_at(rig.now_us + 50U);
     TEST_ASSERT_EQUAL_UINT64(50, seen.at_us - seen.pose_us);
-    TEST_ASSERT_EQUAL_INT16(4, seen.wheel[IW_RIGHT].told->pose.psi_mrad);
+    TEST_ASSERT_EQUAL_INT16(4, seen.wheel[IW_RIGHT].telemetry->pose.psi_mrad);
     TEST_ASSERT_EQUAL_INT32(20, seen.wheel[IW_LEFT].speed_mm_s);
     TEST_ASSERT_EQUAL_INT32(-180, seen.wheel[IW_RIGHT].speed_mm_s);
     TEST_ASSERT_EQUAL_INT64(7, seen.wheel[IW_LEFT].ticks);
@@ -210,11 +210,11 @@ TEST(test_snapshot_listening_has_telemetry_and_its_time) {
 TEST(test_snapshot_heard_and_at_rest_are_judged_at_its_time) {
     gateway_rig_run(&rig, MS(199));
     const iw_time_us_t rest_us = rig.gateway.wheel[IW_LEFT].rest_since_us + MS(rig.config.rest_ms);
-    TEST_ASSERT_FALSE(look_at(rest_us - 1U).wheel[IW_LEFT].at_rest);
-    TEST_ASSERT_TRUE(look_at(rest_us).wheel[IW_LEFT].at_rest);
+    TEST_ASSERT_FALSE(snapshot_at(rest_us - 1U).wheel[IW_LEFT].at_rest);
+    TEST_ASSERT_TRUE(snapshot_at(rest_us).wheel[IW_LEFT].at_rest);
     const iw_time_us_t lost_us = rig.gateway.wheel[IW_LEFT].received_us + MS(rig.config.wheel_silent_ms);
-    TEST_ASSERT_TRUE(look_at(lost_us - 1U).wheel[IW_LEFT].heard);
-    TEST_ASSERT_FALSE(look_at(lost_us).wheel[IW_LEFT].heard);
+    TEST_ASSERT_TRUE(snapshot_at(lost_us - 1U).wheel[IW_LEFT].heard);
+    TEST_ASSERT_FALSE(snapshot_at(lost_us).wheel[IW_LEFT].heard);
 }
 
 TEST(test_snapshot_arming_has_its_client_and_start_time) {
@@ -296,8 +296,8 @@ TEST(test_snapshot_latched_has_a_cause_while_it_prevents_reset) {
     TEST_ASSERT_TRUE(seen.output_zero);
     TEST_ASSERT_EQUAL_UINT32(OTHER, seen.stop->detail);
     TEST_ASSERT_EQUAL_UINT64(pressed_us, seen.seen_us[IW_CAUSE_ESTOP_SOFTWARE]);
-    TEST_ASSERT_EQUAL_HEX32(bit, look_at(pressed_us + MS(1000) - 1U).present);
-    TEST_ASSERT_EQUAL_HEX32(0, look_at(pressed_us + MS(1000)).present);
+    TEST_ASSERT_EQUAL_HEX32(bit, snapshot_at(pressed_us + MS(1000) - 1U).present);
+    TEST_ASSERT_EQUAL_HEX32(0, snapshot_at(pressed_us + MS(1000)).present);
     gateway_rig_run(&rig, MS(5000));
     TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, snapshot().state);
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_SILENCE, snapshot().demand);

@@ -203,7 +203,7 @@ static int read_settings(const char *text, web_settings_t *settings) {
 TEST(test_settings_errors_have_line_and_fix) {
     static const char *const cases[][2] = {
         {"[web]\nport = 0", "f:2: "},
-        {"[web]\nlisten = walker\n", "f:2: listen = walker is no address"},
+        {"[web]\nlisten = walker\n", "f:2: listen = walker is not an address"},
         {"[web]\nlisten = 0.0.0.0\n", "f:2: listen = 0.0.0.0 can be reached from other machines"},
         {"[web]\nlisten = ::\n", "f:2: listen = :: can be reached from other machines"},
         {"[web]\nkey = /a\n", "f:2: key is set without certificate"},

@@ -209,7 +209,7 @@ TEST(test_recording_name_with_a_path_is_refused) {
 #define NOW 5000000U
 
 static web_driver_t driver;
-static const web_limits_t limits = {300, 300000};
+static const web_limits_t limits = {300, 300000, 0};
 static web_command_t command;
 
 static const char *next_command(uint64_t now_us) {
@@ -245,6 +245,16 @@ TEST(test_drive_command_late_or_from_the_future_is_dropped) {
     // The clock of this command was read after that of the bridge, which found the command waiting.
     command.sequence = "2";
     TEST_ASSERT_NULL(next_command(4900000U - WEB_AHEAD_US));
+}
+
+TEST(test_drive_command_has_its_age_by_the_clock_of_the_gateway) {
+    const web_limits_t board = {300, 300000, -4000000};
+    web_twist_t twist;
+    begin();
+    command.t_us = "900000";
+    TEST_ASSERT_NOT_NULL(web_driver_take(&driver, &command, &board, NOW + 200001U, &twist));
+    TEST_ASSERT_NULL(web_driver_take(&driver, &command, &board, NOW + 200000U, &twist));
+    TEST_ASSERT_FALSE(web_driver_silent(&driver, NOW + 200000U));
 }
 
 TEST(test_drive_command_of_another_page_is_dropped) {

@@ -79,14 +79,14 @@ TEST(test_lan_makes_key_and_certificate_once_without_a_message) {
 TEST(test_lan_in_missing_folder_names_the_key_and_the_fix) {
     (void)snprintf(settings.web.token_file, sizeof settings.web.token_file, "%s/none/token", folder);
     TEST_ASSERT_EQUAL_INT(EX_CANTCREAT, prepare());
-    assert_printed("/none/lan-key.pem.new: No such file or directory; let token_file name a folder");
+    assert_printed("/none/lan-key.pem.new: No such file or directory; set token_file to a file in a folder");
 }
 
 TEST(test_lan_in_folder_with_too_long_name_asks_for_shorter_name) {
     memset(settings.web.token_file, 'x', sizeof settings.web.token_file - 1U);
     settings.web.token_file[sizeof settings.web.token_file - 3U] = '/';
     TEST_ASSERT_EQUAL_INT(EX_CANTCREAT, prepare());
-    assert_printed("its folder's name is too long; let token_file name a folder with a shorter name");
+    assert_printed("its folder's name is too long; set token_file to a shorter path");
 }
 
 TEST(test_lan_on_full_disk_asks_for_room) {
@@ -98,7 +98,7 @@ TEST(test_lan_on_full_disk_asks_for_room) {
     const int code = prepare();
     TEST_ASSERT_EQUAL_INT(0, setrlimit(RLIMIT_FSIZE, &before));
     TEST_ASSERT_EQUAL_INT(EX_CANTCREAT, code);
-    assert_printed("/lan-key.pem.new: File too large; make room on this disk");
+    assert_printed("/lan-key.pem.new: File too large; delete files on this disk");
 }
 
 TEST(test_lan_key_that_cannot_be_replaced_is_named_with_its_fix) {
@@ -122,5 +122,5 @@ TEST(test_lan_bad_certificate_is_replaced_with_a_message) {
 TEST(test_lan_hosts_without_room_for_own_name_are_reported) {
     memset(settings.web.hosts, 'x', sizeof settings.web.hosts - 1U);
     TEST_ASSERT_EQUAL_INT(0, prepare());
-    assert_printed("no room for the name of this machine; shorten hosts in the configuration");
+    assert_printed("the name of this machine does not fit into the list; shorten hosts in the configuration");
 }

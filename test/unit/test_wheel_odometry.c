@@ -21,13 +21,13 @@ void setUp(void) {
     begin_side(IW_LEFT);
 }
 
-static void hear_ticks(int32_t ticks) {
+static void receive_ticks(int32_t ticks) {
     const message_t message = {IW_CODEC_STATUS, wheel.side, {.status = {ticks, 255, 30, 20}}};
     now_us += MS(40);
     iw_wheel_receive(&wheel, now_us, message.kind, &message.as, true);
 }
 
-static void hear_speed(int16_t rpm) {
+static void receive_speed(int16_t rpm) {
     const message_t message = {IW_CODEC_SPEED, wheel.side, {.speed = {.speed_rpm = rpm, .acceleration_raw = -1}}};
     iw_wheel_receive(&wheel, now_us, message.kind, &message.as, true);
 }
@@ -35,14 +35,14 @@ static void hear_speed(int16_t rpm) {
 /// The ticks change from one reading to another after `after_us`.
 static iw_reboot_t jump_from(int32_t from, int32_t to, iw_time_us_t after_us) {
     begin_side(IW_LEFT);
-    hear_ticks(from);
+    receive_ticks(from);
     const iw_time_us_t until_us = now_us + after_us;
     while (now_us + MS(500) < until_us) {
         now_us += MS(500);
-        hear_speed(0);
+        receive_speed(0);
     }
     now_us = until_us - MS(40);
-    hear_ticks(to);
+    receive_ticks(to);
     return iw_wheel_next_reboot(&wheel);
 }
 
@@ -56,27 +56,27 @@ static int64_t distance_nm(void) {
 }
 
 TEST(test_wheel_first_status_frame_is_no_distance) {
-    hear_ticks(INT32_MIN);
+    receive_ticks(INT32_MIN);
     TEST_ASSERT_EQUAL_INT64(0, wheel.ticks);
     TEST_ASSERT_EQUAL_INT64(0, distance_nm());
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_next_reboot(&wheel));
 }
 
 TEST(test_wheel_ticks_add_up_in_both_directions) {
-    hear_ticks(100);
-    hear_ticks(110);
+    receive_ticks(100);
+    receive_ticks(110);
     TEST_ASSERT_EQUAL_INT64(10, wheel.ticks);
-    hear_ticks(85);
+    receive_ticks(85);
     TEST_ASSERT_EQUAL_INT64(-15, wheel.ticks);
 }
 
 TEST(test_wheel_ticks_unwrap_in_both_directions) {
-    hear_ticks(INT32_MAX - 4);
-    hear_ticks(INT32_MIN + 5);
+    receive_ticks(INT32_MAX - 4);
+    receive_ticks(INT32_MIN + 5);
     TEST_ASSERT_EQUAL_INT64(10, wheel.ticks);
-    hear_ticks(INT32_MAX);
+    receive_ticks(INT32_MAX);
     TEST_ASSERT_EQUAL_INT64(4, wheel.ticks);
-    hear_ticks(INT32_MIN);
+    receive_ticks(INT32_MIN);
     TEST_ASSERT_EQUAL_INT64(5, wheel.ticks);
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_next_reboot(&wheel));
 }
@@ -86,24 +86,24 @@ TEST(test_wheel_ticks_continue_beyond_32_bits) {
     config.gear_turns = 100;
     begin_side(IW_LEFT);
     wheel.ticks = INT32_MAX;
-    hear_ticks(-20);
-    hear_ticks(0);
-    hear_ticks(20);
+    receive_ticks(-20);
+    receive_ticks(0);
+    receive_ticks(20);
     TEST_ASSERT_EQUAL_INT64((int64_t)INT32_MAX + 40, wheel.ticks);
     TEST_ASSERT_TRUE(distance_nm() == ((int64_t)INT32_MAX + 40) * (int64_t)wheel.nm_per_tick);
 }
 
 TEST(test_wheel_ticks_end_at_their_limit_in_both_directions) {
-    hear_ticks(0);
+    receive_ticks(0);
     wheel.ticks = IW_WHEEL_TICKS_MAX;
-    hear_ticks(1);
+    receive_ticks(1);
     TEST_ASSERT_EQUAL_INT64(IW_WHEEL_TICKS_MAX + 1, wheel.ticks);
-    hear_ticks(2);
+    receive_ticks(2);
     TEST_ASSERT_EQUAL_INT64(IW_WHEEL_TICKS_MAX + 1, wheel.ticks);
     wheel.ticks = -IW_WHEEL_TICKS_MAX;
-    hear_ticks(1);
+    receive_ticks(1);
     TEST_ASSERT_EQUAL_INT64(-IW_WHEEL_TICKS_MAX - 1, wheel.ticks);
-    hear_ticks(0);
+    receive_ticks(0);
     TEST_ASSERT_EQUAL_INT64(-IW_WHEEL_TICKS_MAX - 1, wheel.ticks);
 }
 
@@ -121,7 +121,7 @@ TEST(test_wheel_jump_beyond_physics_is_a_reboot_not_a_distance) {
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_ODOMETRY, jump(-1000, MS(40)));
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_ODOMETRY, jump(INT32_MAX - 5000, MS(40)));
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_ODOMETRY, jump(INT32_MIN, MS(40)));
-    hear_ticks(5001 + INT32_MIN);
+    receive_ticks(5001 + INT32_MIN);
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_next_reboot(&wheel));
     TEST_ASSERT_TRUE(wheel.ticks <= 1);
 }
@@ -175,18 +175,18 @@ TEST(test_wheel_jump_of_2_31_ticks_is_judged_to_the_tick) {
 }
 
 TEST(test_wheel_distance_and_speed_match_the_documented_wheel) {
-    hear_ticks(0);
-    hear_ticks(10);
+    receive_ticks(0);
+    receive_ticks(10);
     TEST_ASSERT_INT64_WITHIN(1000, 201061930, distance_nm());
-    hear_speed(100);
+    receive_speed(100);
     TEST_ASSERT_EQUAL_INT(2010, wheel.speed_mm_s);
-    hear_speed(-100);
+    receive_speed(-100);
     TEST_ASSERT_EQUAL_INT(-2010, wheel.speed_mm_s);
-    hear_speed(1);
+    receive_speed(1);
     TEST_ASSERT_EQUAL_INT(20, wheel.speed_mm_s);
-    hear_speed(-1);
+    receive_speed(-1);
     TEST_ASSERT_EQUAL_INT(-20, wheel.speed_mm_s);
-    hear_speed(0);
+    receive_speed(0);
     TEST_ASSERT_EQUAL_INT(0, wheel.speed_mm_s);
 }
 
@@ -194,14 +194,14 @@ TEST(test_wheel_gear_ratio_divides_ticks_and_rotor_rpm_only) {
     config.gear_turns = 25;
     config.gear_per = 2;
     begin_side(IW_LEFT);
-    hear_ticks(0);
-    hear_ticks(25);
+    receive_ticks(0);
+    receive_ticks(25);
     TEST_ASSERT_INT64_WITHIN(1000, 40212386, distance_nm());
-    hear_speed(100);
+    receive_speed(100);
     TEST_ASSERT_EQUAL_INT(2010, wheel.speed_mm_s);
     config.rpm_of_rotor = true;
     begin_side(IW_LEFT);
-    hear_speed(1000);
+    receive_speed(1000);
     TEST_ASSERT_INT_WITHIN(1, 1608, wheel.speed_mm_s);
 }
 
@@ -219,8 +219,8 @@ TEST(test_wheel_geometry_is_exact_to_10_ppm_for_all_radii) {
             config.gear_turns = gears[g][0];
             config.gear_per = gears[g][1];
             begin_side(IW_LEFT);
-            hear_ticks(0);
-            hear_ticks(10);
+            receive_ticks(0);
+            receive_ticks(10);
             const int64_t expected_nm = nm_per_turn_60th(radii_mm[r]) * 10 * gears[g][1] / gears[g][0];
             const uint64_t margin_nm = (uint64_t)expected_nm / 100000U + 100U;
             TEST_ASSERT_INT64_WITHIN(margin_nm, expected_nm, distance_nm());
@@ -235,7 +235,7 @@ TEST(test_wheel_speed_extremes_do_not_overflow) {
         config.rpm_of_rotor = rotor != 0;
         begin_side(IW_LEFT);
         for (size_t i = 0; i < 2; i++) {
-            hear_speed(extremes[i]);
+            receive_speed(extremes[i]);
             const int64_t expected_mm_s = nm_per_turn_60th(500) * extremes[i] / 1000000;
             TEST_ASSERT_INT64_WITHIN(40, expected_mm_s, wheel.speed_mm_s);
         }
@@ -245,22 +245,22 @@ TEST(test_wheel_speed_extremes_do_not_overflow) {
 TEST(test_wheel_inverted_negates_distance_and_speed_but_not_ticks) {
     config.invert[IW_RIGHT] = true;
     begin_side(IW_RIGHT);
-    hear_ticks(0);
-    hear_ticks(10);
-    hear_speed(100);
+    receive_ticks(0);
+    receive_ticks(10);
+    receive_speed(100);
     TEST_ASSERT_EQUAL_INT64(10, wheel.ticks);
     TEST_ASSERT_INT64_WITHIN(1000, -201061930, distance_nm());
     TEST_ASSERT_EQUAL_INT(-2010, wheel.speed_mm_s);
     begin_side(IW_LEFT);
-    hear_speed(100);
+    receive_speed(100);
     TEST_ASSERT_EQUAL_INT(2010, wheel.speed_mm_s);
 }
 
 TEST(test_wheel_distance_survives_reboots) {
-    hear_ticks(1000);
-    hear_ticks(1010);
-    hear_ticks(0);
+    receive_ticks(1000);
+    receive_ticks(1010);
+    receive_ticks(0);
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_ODOMETRY, iw_wheel_next_reboot(&wheel));
-    hear_ticks(7);
+    receive_ticks(7);
     TEST_ASSERT_EQUAL_INT64(17, wheel.ticks);
 }

@@ -23,21 +23,21 @@ void setUp(void) {
     begin();
 }
 
-static void hear_as(int16_t rpm, bool fresh) {
+static void receive_as(int16_t rpm, bool fresh) {
     const message_t message = {IW_CODEC_SPEED, IW_LEFT, {.speed = {.speed_rpm = rpm}}};
     iw_wheel_receive(&wheel, now_us, message.kind, &message.as, fresh);
 }
 
 static void receive(int16_t rpm) {
-    hear_as(rpm, true);
+    receive_as(rpm, true);
 }
 
-static void hear_status(int32_t ticks) {
+static void receive_status(int32_t ticks) {
     const message_t message = {IW_CODEC_STATUS, IW_LEFT, {.status = {ticks, 240, 30, 20}}};
     iw_wheel_receive(&wheel, now_us, message.kind, &message.as, true);
 }
 
-static void hear_other(iw_codec_kind_t kind) {
+static void receive_other(iw_codec_kind_t kind) {
     message_t message;
     memset(&message, 0, sizeof message);
     message.kind = kind;
@@ -45,7 +45,7 @@ static void hear_other(iw_codec_kind_t kind) {
 }
 
 /// Receives speed frames every 4 ms for `for_us`.
-static void hear_for(iw_time_us_t for_us, int16_t rpm) {
+static void receive_for(iw_time_us_t for_us, int16_t rpm) {
     const iw_time_us_t until_us = now_us + for_us;
     while (now_us + MS(4) <= until_us) {
         now_us += MS(4);
@@ -96,21 +96,21 @@ TEST(test_wheel_stays_online_by_speed_frames_only) {
     receive(0);
     for (uint32_t n = 0; n < 40; n++) {
         now_us += MS(2);
-        hear_other(others[n % 4U]);
+        receive_other(others[n % 4U]);
     }
     TEST_ASSERT_TRUE(iw_wheel_lost(&wheel, now_us));
     TEST_ASSERT_FALSE(iw_wheel_online(&wheel, now_us));
 }
 
 TEST(test_wheel_is_not_online_by_frames_of_unknown_age) {
-    hear_as(7, false);
+    receive_as(7, false);
     TEST_ASSERT_FALSE(iw_wheel_online(&wheel, now_us));
     TEST_ASSERT_TRUE(iw_wheel_lost(&wheel, now_us));
     TEST_ASSERT_EQUAL_INT(140, wheel.speed_mm_s);
     TEST_ASSERT_TRUE(wheel.speed_us == now_us);
     receive(0);
     now_us += SILENT_US - 1U;
-    hear_as(0, false);
+    receive_as(0, false);
     TEST_ASSERT_TRUE(iw_wheel_lost(&wheel, now_us + 1U));
     receive(0);
     TEST_ASSERT_TRUE(iw_wheel_online(&wheel, now_us + 1U));
@@ -125,7 +125,7 @@ TEST(test_wheel_silence_during_our_stall_is_excused_once) {
     TEST_ASSERT_FALSE(iw_wheel_lost(&wheel, now_us + SILENT_US - 1U));
     TEST_ASSERT_TRUE(iw_wheel_lost(&wheel, now_us + SILENT_US));
     iw_wheel_excuse(&wheel, now_us + MS(40));
-    hear_as(0, false);
+    receive_as(0, false);
     iw_wheel_excuse(&wheel, now_us + MS(41));
     TEST_ASSERT_TRUE(iw_wheel_lost(&wheel, now_us + SILENT_US));
 }
@@ -143,7 +143,7 @@ TEST(test_wheel_is_excused_again_after_a_fresh_frame) {
 TEST(test_wheel_at_standstill_counts_an_unbroken_run) {
     receive(0);
     const iw_time_us_t start_us = now_us;
-    hear_for(MS(200), 0);
+    receive_for(MS(200), 0);
     TEST_ASSERT_TRUE(rests(now_us, 0));
     TEST_ASSERT_TRUE(rests(start_us + MS(200), 200000));
     TEST_ASSERT_FALSE(rests(start_us + MS(200) - 1U, 200000));
@@ -176,7 +176,7 @@ TEST(test_wheel_at_standstill_has_its_limit_in_both_directions) {
 
 TEST(test_wheel_standstill_is_broken_by_a_gap) {
     receive(0);
-    hear_for(MS(400), 0);
+    receive_for(MS(400), 0);
     now_us += SILENT_US - 4000U;
     receive(0);
     TEST_ASSERT_TRUE(rests(now_us, 400000));
@@ -188,13 +188,13 @@ TEST(test_wheel_standstill_is_broken_by_a_gap) {
 }
 
 TEST(test_wheel_standstill_cannot_begin_at_a_frame_of_unknown_age) {
-    hear_as(0, false);
+    receive_as(0, false);
     receive(5);
-    hear_as(0, false);
+    receive_as(0, false);
     TEST_ASSERT_FALSE(rests(now_us, 0));
     receive(0);
     TEST_ASSERT_TRUE(rests(now_us, 0));
-    hear_as(30, false);
+    receive_as(30, false);
     TEST_ASSERT_FALSE(rests(now_us, 0));
 }
 
@@ -215,7 +215,7 @@ TEST(test_wheel_that_sends_any_frame_has_not_rebooted) {
     receive(0);
     for (uint32_t n = 0; n < 30; n++) {
         now_us += MS(40);
-        hear_status(0);
+        receive_status(0);
     }
     receive(0);
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_next_reboot(&wheel));
@@ -225,7 +225,7 @@ TEST(test_wheel_silence_of_our_own_stall_is_no_reboot) {
     receive(0);
     now_us += MS(5000);
     iw_wheel_excuse(&wheel, now_us);
-    hear_as(0, false);
+    receive_as(0, false);
     now_us += MS(4);
     receive(0);
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_next_reboot(&wheel));
@@ -245,24 +245,24 @@ TEST(test_wheel_first_frame_is_no_reboot_but_may_set_boot_seen) {
 }
 
 /// Receives offset frames every `period_us` with speed frames between them. None may report a reboot.
-static void hear_offsets(uint32_t number, iw_time_us_t period_us) {
+static void receive_offsets(uint32_t number, iw_time_us_t period_us) {
     for (uint32_t n = 0; n < number; n++) {
-        hear_for(period_us, 0);
-        hear_other(IW_CODEC_OFFSET);
+        receive_for(period_us, 0);
+        receive_other(IW_CODEC_OFFSET);
         TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_next_reboot(&wheel));
     }
 }
 
 TEST(test_wheel_endless_offset_frames_are_no_reboot) {
     receive(0);
-    hear_for(IW_WHEEL_OFFSET_LEARN_US, 0);
-    hear_offsets(200, IW_WHEEL_OFFSET_PERIOD_US);
+    receive_for(IW_WHEEL_OFFSET_LEARN_US, 0);
+    receive_offsets(200, IW_WHEEL_OFFSET_PERIOD_US);
     TEST_ASSERT_EQUAL_UINT32(0, wheel.reboots);
 }
 
 TEST(test_wheel_four_lost_offset_frames_are_no_reboot) {
     receive(0);
-    hear_offsets(30, 5U * IW_WHEEL_OFFSET_PERIOD_US - 1U);
+    receive_offsets(30, 5U * IW_WHEEL_OFFSET_PERIOD_US - 1U);
     TEST_ASSERT_EQUAL_UINT32(0, wheel.reboots);
 }
 
@@ -272,24 +272,24 @@ TEST(test_wheel_found_during_its_offset_frames_has_not_rebooted) {
         begin();
         now_us += MS(10);
         receive(0);
-        hear_offsets(60U - ages_s[i], IW_WHEEL_OFFSET_PERIOD_US);
-        hear_for(MS(120000), 0);
+        receive_offsets(60U - ages_s[i], IW_WHEEL_OFFSET_PERIOD_US);
+        receive_for(MS(120000), 0);
         TEST_ASSERT_EQUAL_UINT32(0, wheel.reboots);
     }
 }
 
 TEST(test_wheel_offset_frames_that_return_are_a_reboot) {
-    static const uint32_t heard_s[] = {1, 10, 58, 61,
-                                       300}; // Also long before a gateway that started late can know the limit of 60 s.
+    static const uint32_t received_s[] = {
+        1, 10, 58, 61, 300}; // Also long before a gateway that started late can know the limit of 60 s.
     for (size_t i = 0; i < 5; i++) {
         for (iw_time_us_t early_us = 0; early_us < 2; early_us++) {
             begin();
             receive(0);
-            hear_offsets(heard_s[i], IW_WHEEL_OFFSET_PERIOD_US);
-            hear_for(IW_WHEEL_OFFSET_BACK_US - early_us, 0);
-            hear_other(IW_CODEC_OFFSET);
+            receive_offsets(received_s[i], IW_WHEEL_OFFSET_PERIOD_US);
+            receive_for(IW_WHEEL_OFFSET_BACK_US - early_us, 0);
+            receive_other(IW_CODEC_OFFSET);
             TEST_ASSERT_EQUAL_INT(early_us ? IW_REBOOT_NONE : IW_REBOOT_OFFSET_FRAMES, iw_wheel_next_reboot(&wheel));
-            hear_offsets(60, IW_WHEEL_OFFSET_PERIOD_US);
+            receive_offsets(60, IW_WHEEL_OFFSET_PERIOD_US);
             TEST_ASSERT_EQUAL_UINT32(early_us ? 0 : 1, wheel.reboots);
         }
     }
@@ -297,13 +297,13 @@ TEST(test_wheel_offset_frames_that_return_are_a_reboot) {
 
 TEST(test_wheel_found_old_has_rebooted_at_an_offset_frame) {
     receive(0);
-    hear_for(IW_WHEEL_OFFSET_BACK_US - 1U, 0);
-    hear_other(IW_CODEC_OFFSET); // At this time the wheel may just have started.
+    receive_for(IW_WHEEL_OFFSET_BACK_US - 1U, 0);
+    receive_other(IW_CODEC_OFFSET); // At this time the wheel may just have started.
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_next_reboot(&wheel));
     begin();
     receive(0);
-    hear_for(IW_WHEEL_OFFSET_BACK_US, 0);
-    hear_other(IW_CODEC_OFFSET);
+    receive_for(IW_WHEEL_OFFSET_BACK_US, 0);
+    receive_other(IW_CODEC_OFFSET);
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_OFFSET_FRAMES, iw_wheel_next_reboot(&wheel));
     TEST_ASSERT_TRUE(wheel.boot_seen);
 }
@@ -311,48 +311,48 @@ TEST(test_wheel_found_old_has_rebooted_at_an_offset_frame) {
 /// Silence or odometry reveals a reboot within the first minute of the wheel, which its offset frames do not reveal.
 TEST(test_wheel_reboot_within_a_minute_shows_by_silence_or_ticks) {
     receive(0);
-    hear_offsets(20, IW_WHEEL_OFFSET_PERIOD_US);
+    receive_offsets(20, IW_WHEEL_OFFSET_PERIOD_US);
     now_us += IW_WHEEL_REBOOT_SILENCE_US;
     receive(0);
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_SILENCE, iw_wheel_next_reboot(&wheel));
-    hear_for(IW_WHEEL_OFFSET_LEARN_US + IW_WHEEL_OFFSET_PERIOD_US, 0);
-    hear_offsets(20, IW_WHEEL_OFFSET_PERIOD_US);
-    hear_status(100000);
-    hear_for(MS(400), 0);
-    hear_status(0);
+    receive_for(IW_WHEEL_OFFSET_LEARN_US + IW_WHEEL_OFFSET_PERIOD_US, 0);
+    receive_offsets(20, IW_WHEEL_OFFSET_PERIOD_US);
+    receive_status(100000);
+    receive_for(MS(400), 0);
+    receive_status(0);
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_ODOMETRY, iw_wheel_next_reboot(&wheel));
-    hear_for(IW_WHEEL_OFFSET_LEARN_US + IW_WHEEL_OFFSET_PERIOD_US, 0);
-    hear_offsets(20, IW_WHEEL_OFFSET_PERIOD_US);
+    receive_for(IW_WHEEL_OFFSET_LEARN_US + IW_WHEEL_OFFSET_PERIOD_US, 0);
+    receive_offsets(20, IW_WHEEL_OFFSET_PERIOD_US);
     TEST_ASSERT_EQUAL_UINT32(2, wheel.reboots);
 }
 
 /// Only the offset frames reveal a restart during a stall of the gateway: silence is excused then.
 TEST(test_wheel_offset_frames_after_our_own_stall_are_a_reboot) {
     receive(0);
-    hear_offsets(3, IW_WHEEL_OFFSET_PERIOD_US);
+    receive_offsets(3, IW_WHEEL_OFFSET_PERIOD_US);
     now_us += IW_WHEEL_OFFSET_BACK_US;
     iw_wheel_excuse(&wheel, now_us);
-    hear_other(IW_CODEC_OFFSET);
+    receive_other(IW_CODEC_OFFSET);
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_OFFSET_FRAMES, iw_wheel_next_reboot(&wheel));
 }
 
 TEST(test_wheel_late_frames_of_other_kinds_are_no_reboot) {
     static const iw_codec_kind_t others[] = {IW_CODEC_SPEED, IW_CODEC_STATUS, IW_CODEC_FORCE, IW_CODEC_POSE};
-    hear_for(MS(70000), 0);
+    receive_for(MS(70000), 0);
     for (size_t i = 0; i < sizeof others / sizeof others[0]; i++) {
-        hear_other(others[i]);
+        receive_other(others[i]);
         TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_next_reboot(&wheel));
     }
 }
 
 TEST(test_wheel_power_cut_with_restarted_odometry_is_one_reboot) {
     receive(0);
-    hear_status(1000000);
+    receive_status(1000000);
     now_us += MS(10000);
-    hear_status(0);
+    receive_status(0);
     receive(0);
     now_us += MS(40);
-    hear_status(1);
+    receive_status(1);
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_SILENCE, iw_wheel_next_reboot(&wheel));
     TEST_ASSERT_EQUAL_UINT32(1, wheel.reboots);
     TEST_ASSERT_TRUE(wheel.ticks == 1);
@@ -360,7 +360,7 @@ TEST(test_wheel_power_cut_with_restarted_odometry_is_one_reboot) {
 
 TEST(test_wheel_standstill_time_saturates_at_its_limit) {
     const iw_time_us_t hours_us = (iw_time_us_t)UINT32_MAX + 5U;
-    hear_for(MS(20), 0);
+    receive_for(MS(20), 0);
     wheel.rest_since_us = now_us - hours_us;
     TEST_ASSERT_EQUAL_UINT32(UINT32_MAX, iw_wheel_rest_us(&wheel, now_us));
     wheel.rest_since_us = now_us - (hours_us - 6U);

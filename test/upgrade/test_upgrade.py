@@ -71,14 +71,14 @@ DRIVER = """import iwheel
 with iwheel.Gateway("/run/iwheel/gateway.sock", wait=10) as gateway:
     gateway.arm("walker").drive_for(60, 300, 300)
 """
-EVIDENCE, JUDGED = verdict.Evidence(), []  # Findings of this attempt, which is a separate process.
+FINDINGS, JUDGED = verdict.Findings(), []  # Findings of this attempt, which is a separate process.
 
 
 def judge(sentence, good, detail="", rule=False):
     """`rule`: a safety rule, which holds no matter how late the machine is."""
     JUDGED.append(sentence)
     if not good:
-        EVIDENCE.failures.append(verdict.Failure(f"{sentence}: {detail}", verdict.RULE if rule else verdict.kind_of(str(detail))))
+        FINDINGS.failures.append(verdict.Failure(f"{sentence}: {detail}", verdict.RULE if rule else verdict.kind_of(str(detail))))
     print(f"{'ok     ' if good else 'FAILED '} {sentence}")
 
 
@@ -413,8 +413,8 @@ def conffiles(machine, old, new):
 
 
 @pytest.fixture
-def evidence():
-    return EVIDENCE
+def findings():
+    return FINDINGS
 
 
 @pytest.fixture
@@ -434,7 +434,7 @@ def machine():
 
 
 @pytest.mark.limit(3600)
-def test_upgrade(evidence, machine, record_property):
+def test_upgrade(findings, machine, record_property):
     try:
         old, new = of_both()
     except Missing as why:

@@ -23,8 +23,9 @@ from pathlib import Path
 
 import pytest
 from bus import now_us
-from harness import Process
+from harness import Process, wait_connect
 from judge_log import GAP_US
+from shifted_clock import ShiftedClock
 from trials import ROOT, Driver, Skip, braking_ms, longest_gap_ms, until
 from web_rig import Person, free_port
 
@@ -509,6 +510,22 @@ def test_page_drives_while_it_asks_and_no_longer(rig):
 
 
 @pytest.mark.rig(driving=True)
+def test_page_drives_a_gateway_with_a_clock_of_its_own(rig):
+    ahead_us = 3_600_000_000
+    rig.start_gateway()
+    rig.web_settings["gateway"]["socket"] = rig.path("board.sock")
+    ShiftedClock(rig.path("board.sock"), rig.path("gateway.sock"), ahead_us)
+    rig.start_web()
+    rig.connected()
+    assert rig.person.arm()[1]["error"] == "stale_command"
+    key = until(lambda: rig.person.arm(t_us=rig.ask_json("GET", "/api/status")[1]["t_us"])[1].get("key"), 6, "it may arm")
+    for number in range(1, 5):
+        assert rig.person.drive(key, number, age_us=-ahead_us)[0] == 200
+        time.sleep(0.05)
+    assert rig.person.drive(key, 9, age_us=400_000 - ahead_us)[1]["error"] == "dropped"
+
+
+@pytest.mark.rig(driving=True)
 def test_bridge_killed_while_driving_stops_the_wheels(rig):
     rig.start().connected()
     key = rig.person.arm()[1]["key"]
@@ -584,6 +601,21 @@ def assert_stops(rig, times=4):
         until(lambda: gateway_state(rig)["state"] == "listening", what="the wheels are at standstill")
 
 
+def test_stop_reaches_a_gateway_whose_places_are_all_in_use(rig):
+    """The bridge starts when other programs have all places of the socket: it can only use those that the gateway keeps for stops."""
+    rig.settings.setdefault("northbound", {})["max_watchers"] = 2
+    rig.write_config()
+    rig.start_gateway()
+    held = [wait_connect(rig.path("watch.sock"), rig.gateway) for _ in range(2)]
+    try:
+        rig.start_web()
+        assert_stops(rig)
+        assert rig.ask("GET", "/health")[0] == 503, "the bridge has no other connection"
+    finally:
+        for one in held:
+            one.close()
+
+
 def test_stop_never_waits_for_viewers_who_poll(rig):
     rig.start().connected()
     with polling(rig, 90, "/api/status"):
@@ -597,7 +629,7 @@ def test_stop_never_waits_for_questions_of_viewers(rig):
 
 
 def test_stop_never_needs_a_free_place_of_the_bridge(rig):
-    """Every place of the bridge is taken: by streams, by pollers, by connections without a request."""
+    """Every place of the bridge is in use: by streams, by pollers, by connections without a request."""
     rig.start().connected()
     streams = [rig.stream() for _ in range(80)]
     idle = [socket.create_connection(("127.0.0.1", rig.port)) for _ in range(200)]
@@ -984,7 +1016,7 @@ def test_check_refuses_a_token_that_the_start_refuses(rig):
 
     token.unlink(missing_ok=True)
     assert check()[0] == 0 and not token.exists(), "the start makes one"
-    for text, mode, about in (("a" * 32, 0o644, "others may read"), ("short", 0o600, "contains no token"), ("a" * 32, 0o600, None)):
+    for text, mode, about in (("a" * 32, 0o644, "other users may read"), ("short", 0o600, "contains no token"), ("a" * 32, 0o600, None)):
         token.write_text(text + "\n", encoding="ascii")
         os.chmod(token, mode)
         code, words = check()
@@ -1188,7 +1220,6 @@ def prometheus(rig):
     child.wait(5)
 
 
-@pytest.mark.full
 def test_prometheus_takes_the_figures_and_alerts_of_an_estop(rig):
     rig.start().connected()
     with prometheus(rig) as ask:
@@ -1207,20 +1238,30 @@ def test_prometheus_takes_the_figures_and_alerts_of_an_estop(rig):
         groups = ask("rules")["groups"]
         assert groups and all(rule["health"] == "ok" for rule in groups[0]["rules"]), groups
         assert not [alert for alert in ask("alerts")["alerts"] if alert["state"] == "firing"]
+
+        def alerts(state):
+            return {alert["labels"]["alertname"]: alert for alert in ask("alerts")["alerts"] if alert["state"] == state}
+
         rig.sim.ask("estop press")
-        firing = until(lambda: [alert for alert in ask("alerts")["alerts"] if alert["state"] == "firing"], 8, "an alert fires")
-        assert [alert["labels"]["alertname"] for alert in firing] == ["IwheelLatched"] and "iwheelctl why" in firing[0]["annotations"]["summary"], firing
+        firing = until(lambda: len(found := alerts("firing")) > 1 and found, 8, "two alerts fire")
+        assert set(firing) == {"IwheelLatched", "IwheelStopped"} and firing["IwheelStopped"]["labels"]["cause"] == "estop_line", firing
+        assert "iwheelctl why" in firing["IwheelLatched"]["annotations"]["summary"], firing
+        assert figure("iwheel_stops_total > 0") == 1 and figure("iwheel_last_stop_number") == 1 and figure("iwheel_build_info") == 1
+        assert abs(figure("iwheel_last_stop_timestamp_seconds") - time.time()) < 60
+        rig.web.signal(signal.SIGTERM)
+        until(lambda: "IwheelWebAway" in alerts("pending"), 8, "Prometheus cannot scrape")
+        assert figure("up") == 0
 
 
 def test_words_of_the_page_are_those_of_iwheelctl(rig):
     """strings.en.js repeats the fixes of causes and the next actions: its texts must be identical."""
     advice = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "app/ctl").rglob("advice.c"))
     strings = (ROOT / "app/bridge/web/page/strings.en.js").read_text(encoding="utf-8")
-    cures = dict(re.findall(r'\{"(\w+)", "([^"]+)"\}', advice))
-    ours = dict(re.findall(r'^    (\w+): "([^"]+)",$', strings[strings.index("  cures: {") :], re.MULTILINE))
-    assert cures and cures == ours, set(cures.items()) ^ set(ours.items())
+    fixes = dict(re.findall(r'\{"(\w+)", "([^"]+)"\}', advice))
+    ours = dict(re.findall(r'^    (\w+): "([^"]+)",$', strings[strings.index("  fixes: {") :], re.MULTILINE))
+    assert fixes and fixes == ours, set(fixes.items()) ^ set(ours.items())
     joined = re.sub(r'"\s*\n\s*"', "", advice)
-    for name, words in re.findall(r'^    (\w+): "([^"]+)",$', strings[strings.index("  next: {") : strings.index("  cures: {")], re.MULTILINE):
+    for name, words in re.findall(r'^    (\w+): "([^"]+)",$', strings[strings.index("  next: {") : strings.index("  fixes: {")], re.MULTILINE):
         plain = re.split(r"\{\w+\}", words)
         assert all(part in joined for part in plain), (name, words)
 
@@ -1241,7 +1282,7 @@ def test_fleet_serves_only_the_file_of_iwheel_fleet(rig):
 
     def refused():
         status, body = rig.ask_json("GET", "/api/fleet")
-        return status == 404 and "see that iwheel-fleet writes" in body["message"]
+        return status == 404 and "check that iwheel-fleet writes" in body["message"]
 
     assert refused()
     source.write_text(text, encoding="ascii")

@@ -3,15 +3,17 @@
 
 import json
 import os
+import time
 from pathlib import Path
 
 import pytest
 from bus import now_us
 from firefox import ASSETS, firefox_page
-from test_browser import SIZES, turns
+from test_browser import LONG, SIZES, turns
 from test_first_screen import AREAS, FIGURES, VIEWS
 from trials import Driver, braking_ms, until
 
+ZOOMED = (1400 * 10 // 33, 900 * 10 // 33)  # What a window on a desk shows at a zoom of 3.3.
 LIVE = "document.querySelector('#news').className === 'good'"
 
 
@@ -25,7 +27,7 @@ def all_seen(page, ids, what):
         assert area["inside"] and area["card"] and area["free"] and area["whole"] and area["text"].strip(), (what, area)
 
 
-def stands(rig):
+def at_standstill(rig):
     until(lambda: rig.ask_json("GET", "/api/status")[1]["state"] == "listening", what="the wheels are at standstill")
 
 
@@ -58,12 +60,20 @@ def test_firefox_stop_acts_by_each_input_above_dialogs(rig):
     rig.start().connected()
     with firefox_page(rig.url, *SIZES["small"]) as page:
         page.seen(LIVE)
-        for text, question, way in ((100, "#estop-ask", "mouse"), (200, "#arm", "touch"), (100, "#arm", "s"), (200, "#estop-ask", "click")):
+        for text, question, way, size in (
+            (100, "#estop-ask", "mouse", SIZES["small"]),
+            (200, "#arm", "touch", SIZES["small"]),
+            (100, "#arm", "s", ZOOMED),
+            (200, "#estop-ask", "click", SIZES["small"]),
+            (100, "#estop-ask", "mouse", ZOOMED),
+        ):
+            page.size(*size)
+            page.seen(f"innerWidth === {size[0]}")
             page.run(f"document.documentElement.style.fontSize = '{text}%'")
             page.run(f"document.querySelector('{question}').click()")
             page.seen("document.querySelector('#ask').open")
             all_seen(page, ["stop"], (text, question))
-            shot(page, f"stop-{text}-{question[1:]}")
+            shot(page, f"stop-{text}-{question[1:]}-{size[0]}")
             driver = Driver(rig)
             since = now_us()
             if way in ("mouse", "touch"):
@@ -79,7 +89,7 @@ def test_firefox_stop_acts_by_each_input_above_dialogs(rig):
             page.seen("document.querySelector('#delivered').textContent.startsWith('Stop delivered')")
             driver.end()
             driver.client.close()
-            stands(rig)
+            at_standstill(rig)
 
 
 @pytest.mark.rig(driving=True)
@@ -107,7 +117,7 @@ def test_firefox_pad_drives_by_touch_until_released(rig):
             assert late < 1000, f"{end}: {late} ms"
             assert not page.evaluate("drive.held"), end
             page.let_go()
-            stands(rig)
+            at_standstill(rig)
             until(lambda: rig.ask_json("GET", "/api/status")[1]["lease"]["holder"] is None, what="no client drives")
 
 
@@ -127,6 +137,16 @@ def test_firefox_plays_a_recording_and_speaks_german(rig):
         assert not page.evaluate("document.querySelector('#left > details').checkVisibility()"), "no live figure under the heading of a recording"
         page.run("goTo(-0.03)")
         page.seen("parseInt(document.querySelector('#left .plot .measured b').textContent) > 100")
+        assert page.text("#happened li:last-child").endswith("s: gesperrt") and "Not-Halt gedrückt" in page.text("#happened")
         shot(page, "recording")
         page.click("#live")
         page.seen("document.querySelector('#player').hidden")
+        page.run(LONG)
+        page.run("setTimeout(() => document.querySelector('#recordings [data-ending=mcap]').click())")
+        for _ in range(5):
+            page.key("s")
+            time.sleep(0.1)
+        late = sorted(page.evaluate("late"))
+        print(f'        from the press to "Stop delivered": {late} ms', flush=True)
+        assert late and late[-1] < 200 and late[len(late) // 2] < 100, late
+        page.seen("document.querySelector('#job').hidden")

@@ -4,6 +4,7 @@
 import contextlib
 import json
 import os
+import re
 import threading
 import time
 from pathlib import Path
@@ -12,7 +13,7 @@ import pytest
 from bus import now_us
 from judge_log import LEFT, RIGHT
 from test_bridge import start_lan
-from test_browser import SIZES, live, page_of, press_stop, seen, turns
+from test_browser import SIZES, live, mouse_on_stop, page_of, press_stop, seen, turns
 from trials import Driver, braking_ms, until
 
 PHONES = {"portrait": (390, 844), "landscape": (844, 390), "small": (320, 568)}
@@ -34,9 +35,16 @@ def touch(size):
     return {} if size == "wide" else {"is_mobile": True, "has_touch": True}
 
 
-def shot(page, name):
+def shot(page, name, at=None):
     if os.environ.get("IWHEEL_WEB_SHOTS"):
+        if at:
+            page.locator(at).scroll_into_view_if_needed()
         page.screenshot(path=Path(os.environ["IWHEEL_WEB_SHOTS"]) / f"{name}.png")
+
+
+# Cells of the assumptions that a person sees only after scrolling to the right.
+CELLS_OUTSIDE = """[...document.querySelectorAll('#ledger :is(th, td)')].filter((one) => one.getBoundingClientRect().right >
+  document.querySelector('#ledger').closest('.card').getBoundingClientRect().right).map((one) => one.textContent)"""
 
 
 def all_seen(page, ids, what):
@@ -70,9 +78,9 @@ def test_state_figures_and_last_stop_are_on_the_first_screen(rig, scheme):
 
 def test_large_figures_are_those_of_the_snapshot(rig):
     rig.start().connected()
-    driver = Driver(rig, 200)
     with page_of(rig, "portrait", **touch("portrait")) as page:
         live(page)
+        driver = Driver(rig, 200)
         for unit, factor, digits in (("m/s", 0.001, 2), ("km/h", 0.0036, 1)):
             page.select_option("#units", unit)
             until(lambda: page.evaluate("page.state.left.speed_mm_s") > 150, what="it drives")
@@ -119,6 +127,26 @@ def test_stop_is_usable_above_dialogs_zoomed_and_in_large_text(rig):
                 page.context.new_cdp_session(page).send("Emulation.setPageScaleFactor", {"pageScaleFactor": 1})
 
 
+@pytest.mark.rig(driving=True)
+def test_stop_cancels_the_question_of_reset(rig):
+    rig.start().connected()
+    with page_of(rig, "small", **touch("small")) as page:
+        live(page)
+        rig.ask("POST", "/api/estop")
+        page.wait_for_selector("#reset:visible")
+        seen(page, "page.stop !== null")
+        for zoom, text in ((1, 100), (3.3, 100), (1, 200)):
+            page.evaluate(f"document.documentElement.style.fontSize = '{text}%'; document.querySelector('#reset').click()")
+            page.context.new_cdp_session(page).send("Emulation.setPageScaleFactor", {"pageScaleFactor": zoom})
+            time.sleep(0.3)
+            assert page.evaluate("document.querySelector('#ask').open")
+            page.evaluate("showResult('')")
+            mouse_on_stop(page, "Pressed")
+            seen(page, "!document.querySelector('#ask').open && document.querySelector('#delivered').textContent.startsWith('Stop delivered')")
+            mouse_on_stop(page, "Released")
+            assert rig.ask_json("GET", "/api/status")[1]["state"] == "latched"
+
+
 def test_two_fingers_do_not_zoom_the_page(rig):
     rig.start().connected()
     with page_of(rig, "portrait", **touch("portrait")) as page:
@@ -157,6 +185,8 @@ def test_page_has_no_bar_across_in_any_size_and_text(rig):
                 time.sleep(0.2)
                 wide = page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")
                 assert wide <= 0, (size, text, wide)
+                assert page.evaluate(CELLS_OUTSIDE) == [], (size, text)
+                shot(page, f"assumptions-{size}-{text}", "#ledger")
 
 
 def test_stop_of_the_page_is_quick_while_ninety_others_poll(rig):
@@ -209,6 +239,8 @@ def test_pad_in_each_size_is_visible_with_state_and_estop(rig):
             turns(rig)
             seen(page, "!document.querySelector('#ring').hidden && parseFloat(document.querySelector('#pad-measured').textContent) > 0.05")
             shot(page, f"pad-{size}")
+            for words in page.evaluate("['pad-command', 'pad-measured', 'pad-limit'].map((id) => document.getElementById(id).textContent)"):
+                assert re.fullmatch(r"-?\d\.\d\d m/s, -?\d+\s°/s", words), (size, words)
             page.mouse.up()
             until(lambda: rig.ask_json("GET", "/api/status")[1]["state"] == "listening", what="the wheels are at standstill")
             page.click("#pad-off")
@@ -343,16 +375,19 @@ def test_page_in_german_browser_is_german_english_on_request(rig):
 # ---- plots ----------------------------------------------------------------------------------------------------------
 
 
+FORCES_SHOWN = "plots.left.force.lines.map((line) => plots.left.force.shows(line))"  # Raw force, zero, net force.
+
+
 def scale(page, side, what, axis="x"):
     return page.evaluate(f"[plots.{side}.{what}.uplot.scales.{axis}.min, plots.{side}.{what}.uplot.scales.{axis}.max]")
 
 
 def test_plots_have_common_axes_spans_and_marks(rig):
     rig.start().connected()
-    driver = Driver(rig, 200)
     with page_of(rig) as page:
         live(page)
         page.evaluate("document.querySelector('#tools').scrollIntoView()")
+        driver = Driver(rig, 200)  # The start of a browser may stall a small machine for longer than the driver's lease.
         rig.sim.ask("load left 30")
         time.sleep(1.5)
         rig.ask("POST", "/api/stop")
@@ -366,7 +401,7 @@ def test_plots_have_common_axes_spans_and_marks(rig):
         for what in ("speed", "force"):
             assert scale(page, "left", what, "y") == scale(page, "right", what, "y"), what
         assert scale(page, "left", "speed", "y")[1] > 150
-        assert page.evaluate("plots.left.force.lines.map((line) => plots.left.force.shows(line))") == [False, False, True]
+        assert page.evaluate(FORCES_SHOWN) == [False, False, True]
         page.click("#forces")
         assert page.evaluate("plots.right.force.lines.every((line) => plots.right.force.shows(line))")
         page.click("#freeze")
@@ -423,8 +458,10 @@ def test_recording_starts_at_0_and_shows_no_live_values(rig):
         assert not page.locator("#left > details").is_visible() and not page.locator("#right > details").is_visible()
         page.evaluate("goTo(-0.03)")
         assert int(page.inner_text("#left .plot .measured b")) > 150, "the value at the cursor"
+        assert page.evaluate(FORCES_SHOWN)[0], "a recording has raw forces only"
         shot(page, "recording")
         page.click("#live")
+        assert page.evaluate(FORCES_SHOWN) == [False, False, True]
         assert page.locator("#left > details").is_visible() and page.evaluate("document.querySelector('#left .at').hidden")
 
 

@@ -13,8 +13,8 @@ static uint64_t now_us;
 
 uint64_t __wrap_bridge_now_us(void);
 int __wrap_web_link_step(web_link_t *self, uint64_t at_us);
-void __wrap_web_door_step(web_door_t *self, uint64_t at_us);
-int __wrap_web_door_take(web_door_t *self);
+void __wrap_web_backlog_step(web_backlog_t *self, uint64_t at_us);
+int __wrap_web_backlog_take(web_backlog_t *self);
 enum MHD_Result __wrap_MHD_run(struct MHD_Daemon *daemon);
 
 uint64_t __wrap_bridge_now_us(void) {
@@ -27,12 +27,12 @@ int __wrap_web_link_step(web_link_t *self, uint64_t at_us) {
     return 0;
 }
 
-void __wrap_web_door_step(web_door_t *self, uint64_t at_us) {
+void __wrap_web_backlog_step(web_backlog_t *self, uint64_t at_us) {
     (void)self;
     (void)at_us;
 }
 
-int __wrap_web_door_take(web_door_t *self) {
+int __wrap_web_backlog_take(web_backlog_t *self) {
     (void)self;
     return -1;
 }
@@ -62,7 +62,7 @@ void setUp(void) {
     memset(&settings, 0, sizeof settings);
     settings.web.max_connections = 16;
     server.settings = &settings;
-    server.look_us = UINT64_MAX;
+    server.poll_us = UINT64_MAX;
     server.link.gateway.stop.line.socket = "/nowhere/gateway.sock";
     now_us = 1000000;
     bridge_place_t *place = &server.link.lease.place[0];

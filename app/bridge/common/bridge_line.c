@@ -56,12 +56,13 @@ static iwc_result_t meaning_of(int error) {
     return (error == EAGAIN) ? IWC_TIMEOUT : IWC_NOT_THERE;
 }
 
-bool bridge_line_connect(bridge_line_t *self, uint64_t now_us) {
+/// Returns a connected descriptor in the epoll set; -1: `result` says why there is none.
+static int dial(bridge_line_t *self) {
     struct sockaddr_un address = {.sun_family = AF_UNIX};
     const int length = snprintf(address.sun_path, sizeof address.sun_path, "%s", self->socket);
     if (length < 0 || (size_t)length >= sizeof address.sun_path) {
         self->result = IWC_INVALID;
-        return false;
+        return -1;
     }
     const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
     struct epoll_event event = {.events = EPOLLIN};
@@ -71,11 +72,28 @@ bool bridge_line_connect(bridge_line_t *self, uint64_t now_us) {
         if (fd >= 0) {
             (void)close(fd);
         }
+        return -1;
+    }
+    return fd;
+}
+
+bool bridge_line_connect(bridge_line_t *self, uint64_t now_us) {
+    self->greeting_fd = dial(self);
+    if (self->greeting_fd < 0) {
         return false;
     }
-    self->greeting_fd = fd;
     self->greeting_until_us = now_us + BRIDGE_GREETING_US;
     self->state = BRIDGE_GREETING;
+    return true;
+}
+
+bool bridge_line_connect_for_stop(bridge_line_t *self) {
+    const int fd = dial(self);
+    if (fd < 0) {
+        return false;
+    }
+    (void)iwc_adopt_for_stop(self->gateway, fd); // It fails for a bad descriptor only.
+    self->state = BRIDGE_HERE;
     return true;
 }
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 /// One connection of a bridge to the gateway, and the requests on it that have no reply yet. No call waits.
 ///
+///       +--------connect_for_stop----------+
+///       |                                  v
 ///     AWAY --connect--> GREETING --hello--> HERE
 ///       ^                  |                 |
 ///       +--- refused, no hello, closed, drop-+
@@ -48,6 +50,10 @@ void bridge_line_close(bridge_line_t *self);
 
 /// Begins to connect an AWAY line. Returns false and sets `result` if the socket accepts no connection now.
 bool bridge_line_connect(bridge_line_t *self, uint64_t now_us);
+
+/// The same for a line that carries stops only, which waits for no greeting: the line is then HERE. The gateway sends no
+/// greeting in the places that it keeps for stops. It closes a connection there after 200 ms without a stop.
+bool bridge_line_connect_for_stop(bridge_line_t *self);
 
 /// Drops the connection, and answers each request without a reply with NULL.
 void bridge_line_drop(bridge_line_t *self, iwc_result_t why);

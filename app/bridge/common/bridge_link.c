@@ -13,6 +13,10 @@
 #define WATCH "{\"cmd\":\"watch\",\"topics\":[\"state\",\"bus\",\"estop\",\"lease\",\"stop\"],\"rate_hz\":%u}"
 /// The gateway creates its socket and then changes the group. Missing rights are reported only after this time.
 #define DENIED_US 5000000U
+/// Two clocks drift apart by 1 us in this time at most: 100 ppm each.
+#define DRIFT_US 5000U
+/// A gateway whose clock is behind by less than this time uses the same clock: the difference is the way of its events.
+#define SAME_US 100000
 
 bool bridge_link_open(bridge_link_t *self, const bridge_link_terms_t *terms, const bridge_listener_t *listener) {
     memset(self, 0, sizeof *self);
@@ -54,6 +58,7 @@ static void lose(bridge_link_t *self) {
     const char *socket = self->terms.socket;
     bridge_line_drop(&self->line, self->line.result);
     self->state = BRIDGE_LINK_AWAY;
+    self->has_clock = false;
     if (before == BRIDGE_LINK_HERE) {
         (void)fprintf(stderr, "%s: the gateway at %s is gone; waiting for it\n", self->terms.program, socket);
         for (unsigned left = self->count; left > 0U; left--) {
@@ -138,6 +143,26 @@ static int come_here(bridge_link_t *self) {
     return 0;
 }
 
+static int64_t drifted(const bridge_link_t *self, uint64_t now_us) {
+    return self->ahead_us - (int64_t)((now_us - self->ahead_at_us) / DRIFT_US);
+}
+
+int64_t bridge_link_ahead_us(const bridge_link_t *self, uint64_t now_us) {
+    const int64_t ahead_us = self->has_clock ? drifted(self, now_us) : 0;
+    return (ahead_us > -SAME_US && ahead_us < 0) ? 0 : ahead_us;
+}
+
+/// An event that was late on the way changes nothing.
+static void read_clock(bridge_link_t *self, const iwc_message_t *event) {
+    const iwc_value_t t_us = iwc_integer(event, "t_us");
+    const int64_t ahead_us = t_us.value - (int64_t)self->now_us;
+    if (t_us.known && (!self->has_clock || ahead_us > drifted(self, self->now_us))) {
+        self->has_clock = true;
+        self->ahead_us = ahead_us;
+        self->ahead_at_us = self->now_us;
+    }
+}
+
 static void listen_now(bridge_link_t *self) {
     iwc_message_t event;
     if (self->terms.latest && self->state == BRIDGE_LINK_HERE) {
@@ -146,6 +171,7 @@ static void listen_now(bridge_link_t *self) {
     const iwc_t *gateway = self->line.gateway; // Read once: the descriptor stays readable if there is more.
     for (unsigned i = 0; i < 256U && (i == 0U || iwc_pending(gateway)) && bridge_line_next(&self->line, &event); i++) {
         if (self->state == BRIDGE_LINK_HERE) {
+            read_clock(self, &event);
             self->listener.event(self->listener.context, &event, self->now_us);
         }
     }

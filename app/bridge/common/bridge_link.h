@@ -61,6 +61,9 @@ typedef struct {
     uint64_t now_us;                           ///< Time of the call in progress.
     bridge_question_t waits[BRIDGE_ASKED_MAX]; ///< Oldest first.
     unsigned count;
+    bool has_clock;       ///< An event of this connection had a time.
+    int64_t ahead_us;     ///< Largest difference between the time of an event and of its arrival ...
+    uint64_t ahead_at_us; ///< ... and the time at which it was found.
 } bridge_link_t;
 
 /// Returns false if there is no memory. The texts of `terms` must outlive the link. The link must not be moved.
@@ -73,6 +76,12 @@ int bridge_link_step(bridge_link_t *self, uint64_t now_us);
 
 /// Returns the time of the next work of `step` without input.
 uint64_t bridge_link_next_us(const bridge_link_t *self, uint64_t now_us);
+
+/// Returns how far the gateway's clock is ahead of CLOCK_MONOTONIC of this process, in microseconds. A gateway on a board
+/// has a clock of its own; a gateway on this machine uses the same one, and the result is 0. Otherwise it is never too
+/// large. It is too small by the time on the way of the fastest event of this connection, and falls by 200 ppm until the
+/// next such event, because clocks drift. 0 before the first event.
+int64_t bridge_link_ahead_us(const bridge_link_t *self, uint64_t now_us);
 
 /// Changes the rate of the event `state`. If the gateway cannot be asked now, nothing changes: call it again.
 void bridge_link_rate(bridge_link_t *self, unsigned rate_hz, uint64_t now_us);

@@ -73,7 +73,7 @@ void bridge_service_open(bridge_service_t *self) {
     self->every_us = (limit != NULL) ? strtoull(limit, NULL, 10) / 2U : 0U;
 }
 
-void bridge_service_tell(const bridge_service_t *self, const char *words) {
+void bridge_service_notify(const bridge_service_t *self, const char *words) {
     if (self->fd >= 0) {
         (void)send(self->fd, words, strlen(words), MSG_DONTWAIT | MSG_NOSIGNAL);
     }
@@ -82,6 +82,6 @@ void bridge_service_tell(const bridge_service_t *self, const char *words) {
 void bridge_service_round(bridge_service_t *self, uint64_t now_us) {
     if (self->every_us > 0U && now_us - self->fed_us >= self->every_us) {
         self->fed_us = now_us;
-        bridge_service_tell(self, "WATCHDOG=1");
+        bridge_service_notify(self, "WATCHDOG=1");
     }
 }

@@ -31,7 +31,7 @@ bool bridge_service_wait(struct pollfd *fds, unsigned count, int wait_ms);
 void bridge_service_open(bridge_service_t *self);
 
 /// Sends a message to the service manager. Never waits.
-void bridge_service_tell(const bridge_service_t *self, const char *words);
+void bridge_service_notify(const bridge_service_t *self, const char *words);
 
 /// Feeds the watchdog at half its time. Call it only at the end of a complete round of the loop.
 void bridge_service_round(bridge_service_t *self, uint64_t now_us);

@@ -110,6 +110,11 @@ static void plan_try(bridge_stop_t *self, uint64_t now_us) {
     self->try_us = is_wanted(self) ? now_us + URGENT_US : later_us;
 }
 
+static bool connect_now(bridge_stop_t *self, uint64_t now_us) {
+    self->since_us = now_us;
+    return bridge_line_connect_for_stop(&self->line);
+}
+
 static void listen_now(bridge_stop_t *self, uint64_t now_us) {
     iwc_message_t event;
     while (bridge_line_next(&self->line, &event)) {
@@ -131,15 +136,7 @@ static void listen_now(bridge_stop_t *self, uint64_t now_us) {
 void bridge_stop_step(bridge_stop_t *self, uint64_t now_us) {
     if (self->line.state == BRIDGE_AWAY && now_us >= self->try_us) {
         plan_try(self, now_us);
-        (void)bridge_line_connect(&self->line, now_us);
-    }
-    if (self->line.state == BRIDGE_GREETING) {
-        const bridge_line_state_t state = bridge_line_greet(&self->line, now_us);
-        if (state == BRIDGE_HERE) {
-            self->since_us = now_us;
-        } else if (state == BRIDGE_AWAY) {
-            plan_try(self, now_us);
-        }
+        (void)connect_now(self, now_us);
     }
     if (self->line.state == BRIDGE_HERE) {
         listen_now(self, now_us);
@@ -177,8 +174,7 @@ bool bridge_stop_ask(bridge_stop_t *self, const char *request, bridge_answer_t a
     if (strlen(request) >= BRIDGE_REQUEST_SIZE) {
         return false;
     }
-    if (self->line.state == BRIDGE_AWAY && !bridge_line_connect(&self->line, now_us) &&
-        self->line.result != IWC_TIMEOUT) {
+    if (self->line.state == BRIDGE_AWAY && !connect_now(self, now_us) && self->line.result != IWC_TIMEOUT) {
         return false;
     }
     if (self->wanted_until_us[kind] == 0U) {

@@ -19,10 +19,10 @@
 #define LONGEST_US  30000000U
 /// A connection that ends earlier than SHORT_US after its acceptance is short. SHORT_MAX short ones in a row are
 /// logged, at most once a minute.
-#define SHORT_US      2000000U
-#define SHORT_MAX     3U
-#define SHORT_TOLD_US 60000000U
-#define LOOK_US       500000U
+#define SHORT_US     2000000U
+#define SHORT_MAX    3U
+#define SHORT_LOG_US 60000000U
+#define POLL_US      500000U
 /// Packets that are read in one call, so that a flood does not delay messages of the gateway.
 #define PACKETS 32
 /// Messages that may wait in the library for a broker that does not read. The messages of the spool are among them.
@@ -149,7 +149,7 @@ static void judge_end(mqtt_broker_t *self) {
             self->listener.program, self->host,
             name_in_use ? "because another client used its name" : "repeatedly, shortly after accepting it",
             self->listener.name, name_in_use ? "" : ", or see the broker's log for a message that it does not accept");
-        self->short_us = self->now_us + SHORT_TOLD_US;
+        self->short_us = self->now_us + SHORT_LOG_US;
     }
 }
 
@@ -240,7 +240,7 @@ static void begin_connecting(mqtt_broker_t *self) {
     self->lost = false;
     self->refusal = 0;
     if (!set_up(self)) {
-        lose(self, "cannot create its client: check certificate and key, or the memory is full");
+        lose(self, "cannot create the MQTT client; check certificate and key, and free memory");
         return;
     }
     self->caller.client = self->client;
@@ -291,8 +291,8 @@ static void work(mqtt_broker_t *self) {
     if (result == MOSQ_ERR_SUCCESS && mosquitto_want_write(self->client)) {
         result = mosquitto_loop_write(self->client, 1);
     }
-    if (result == MOSQ_ERR_SUCCESS && self->now_us >= self->look_us) {
-        self->look_us = self->now_us + LOOK_US;
+    if (result == MOSQ_ERR_SUCCESS && self->now_us >= self->poll_us) {
+        self->poll_us = self->now_us + POLL_US;
         result = mosquitto_loop_misc(self->client);
     }
     if (!mosquitto_want_write(self->client)) {
@@ -329,7 +329,7 @@ uint64_t mqtt_broker_next_us(const mqtt_broker_t *self) {
     case MQTT_CONNECTING:
         return UINT64_MAX;
     default:
-        return self->look_us;
+        return self->poll_us;
     }
 }
 

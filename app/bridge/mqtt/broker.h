@@ -85,7 +85,7 @@ typedef struct {
     uint64_t wait_us;
     uint64_t random;
     uint64_t until_us; ///< MQTT_GREETING: deadline of CONNACK.
-    uint64_t look_us;  ///< Next time at which the library checks its keepalive.
+    uint64_t poll_us;  ///< Next time at which the library checks its keepalive.
     unsigned behind;   ///< Messages that were sent while others still waited in the library.
     uint64_t unsent;   ///< Messages that were not sent, because too many waited or by an error.
     const char *unfit; ///< Reason of the last MQTT_NEVER.

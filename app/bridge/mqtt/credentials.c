@@ -24,7 +24,8 @@ static int judge_secret(int file, const char *path) {
     const mode_t others = (status.st_uid == 0U) ? 0037U : 0077U;
     return (ours && (status.st_mode & others) == 0U)
                ? 0
-               : complain(EX_NOPERM, path, "others may read or change it; chown iwheel-mqtt and chmod 600 it");
+               : complain(EX_NOPERM, path,
+                          "other users may read or change it; chown it to iwheel-mqtt and chmod it to 600");
 }
 
 static int read_credentials(const char *path, char **out_user, char **out_password) {

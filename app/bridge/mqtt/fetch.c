@@ -11,7 +11,7 @@
 #include <string.h>
 #include <sysexits.h>
 
-#define MACHINE_SAYS_NO 1
+#define MACHINE_REFUSES 1
 /// After this time an answer is lost or late.
 #define ANSWER_US 2000000U
 /// An older quote is not used, because the way to the machine also counts as age, and the largest age is one second.
@@ -71,11 +71,11 @@ void fetch_choose(fetch_t *self, const char *name, uint64_t now_us) {
     }
     if (place == self->count) {
         if (name == NULL) {
-            fail(self, MACHINE_SAYS_NO,
+            fail(self, MACHINE_REFUSES,
                  "%s has no recording: it has not stopped since they were removed, or [record] blackbox_s is 0",
                  self->id);
         } else {
-            fail(self, MACHINE_SAYS_NO, "%s has no recording %s; it has: iwheel-fleet recordings %s", self->id, name,
+            fail(self, MACHINE_REFUSES, "%s has no recording %s; it has: iwheel-fleet recordings %s", self->id, name,
                  self->id);
         }
         return;
@@ -84,7 +84,7 @@ void fetch_choose(fetch_t *self, const char *name, uint64_t now_us) {
     self->begun_us = now_us;
     next_file(self, 0, now_us);
     if (self->stage == FETCH_DONE || !self->list[place].bytes[FETCH_FILES - 1U].known) {
-        fail(self, MACHINE_SAYS_NO, "%s has no frames of %s: they could not be written; see that machine's log",
+        fail(self, MACHINE_REFUSES, "%s has no frames of %s: they could not be written; see that machine's log",
              self->id, self->list[place].name);
     }
 }
@@ -239,7 +239,7 @@ static void take_refusal(fetch_t *self, iwn_json_t root, uint64_t now_us) {
     self->next_us = now_us + ((is_one_of(error, quotes) && self->refused < 3U) ? 0U : PAUSE_US);
     if (!is_one_of(error, quotes) && !is_one_of(error, passing) &&
         (strcmp(error, "denied") != 0 || self->refused >= REFUSED_MAX)) {
-        fail(self, MACHINE_SAYS_NO, "%s refuses: %s", self->id, self->words);
+        fail(self, MACHINE_REFUSES, "%s refuses: %s", self->id, self->words);
     }
 }
 

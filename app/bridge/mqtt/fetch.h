@@ -51,8 +51,8 @@ typedef struct {
     size_t file; ///< Number of the file that is fetched.
     iwc_piece_t piece;
     uint8_t bytes[IWC_PIECE_MAX]; ///< Bytes of the last piece.
-    size_t got;                   ///< Number of these bytes.
-    size_t got_file;              ///< Number of their file.
+    size_t got;                   ///< Number of bytes in `bytes`.
+    size_t got_file;              ///< Number of the file that these bytes belong to.
     uint64_t pieces;
     uint64_t again;           ///< Commands that were repeated.
     int code;                 ///< FAILED: an exit code of sysexits, or 1 if the machine refuses.

@@ -103,8 +103,8 @@ static void take_stop(fleet_machine_t *machine, const iwc_message_t *stop, const
     const int64_t when_us = iwc_integer(stop, wall_us).value;
     char word[sizeof machine->cause];
     fleet_text(stop, cause, word, sizeof word);
-    const bool later = machine->stop_from != FLEET_HEARD && when_us > machine->stop_wall_us;
-    if (word[0] == '\0' || (source != FLEET_HEARD && machine->stop_from != FLEET_NOBODY && !later)) {
+    const bool later = machine->stop_from != FLEET_LIVE && when_us > machine->stop_wall_us;
+    if (word[0] == '\0' || (source != FLEET_LIVE && machine->stop_from != FLEET_NONE && !later)) {
         return;
     }
     memcpy(machine->cause, word, sizeof word);
@@ -172,7 +172,7 @@ void fleet_take(fleet_t *self, const char *topic, const char *payload, size_t le
     if (strcmp(what, "state") == 0) {
         take_state(machine, &message, root);
     } else if (strcmp(what, "event/stop") == 0) {
-        take_stop(machine, &message, "", FLEET_HEARD);
+        take_stop(machine, &message, "", FLEET_LIVE);
     }
 }
 
@@ -295,7 +295,7 @@ static size_t write_row(const fleet_machine_t *machine, uint64_t now_us, char li
     return (length > 0U) ? length - 1U : 0U;
 }
 
-void fleet_tell(const fleet_t *self, uint64_t now_us, FILE *out) {
+void fleet_print(const fleet_t *self, uint64_t now_us, FILE *out) {
     char line[ROW_SIZE];
     for (size_t i = 0; i < self->count; i++) {
         (void)fprintf(out, "%.*s\n", (int)write_row(&self->machines[i], now_us, line), line);

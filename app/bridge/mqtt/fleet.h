@@ -19,10 +19,10 @@
 
 /// Source of a last stop.
 typedef enum {
-    FLEET_NOBODY,
+    FLEET_NONE,
     FLEET_INFO,   ///< Retained `info` of the machine: the last stop that its bridge knows.
     FLEET_STREAM, ///< Stream of the cluster.
-    FLEET_HEARD   ///< Live event of the machine.
+    FLEET_LIVE    ///< Live event of the machine.
 } fleet_source_t;
 
 typedef struct {
@@ -69,7 +69,7 @@ void fleet_text(const iwc_message_t *message, const char *path, char *out, size_
 void fleet_show(const fleet_t *self, uint64_t now_us, FILE *out);
 
 /// Prints one JSON object per machine and line.
-void fleet_tell(const fleet_t *self, uint64_t now_us, FILE *out);
+void fleet_print(const fleet_t *self, uint64_t now_us, FILE *out);
 
 /// Prints one JSON object with all machines and the current wall clock, for iwheel-web.
 void fleet_write(const fleet_t *self, uint64_t now_us, int64_t wall_us, FILE *out);

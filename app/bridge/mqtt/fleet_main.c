@@ -138,7 +138,7 @@ static int take_words(words_t *self, int count, char **words) {
         return misuse("\"%.40s\" is not a verb; the verbs are history, recordings and recording", words[0]);
     }
     if (count > most[self->verb]) {
-        return misuse("\"%.40s\" is one word too many", words[most[self->verb]]);
+        return misuse("\"%.40s\" is one argument too many", words[most[self->verb]]);
     }
     self->wanted.id = (count > 1) ? words[1] : NULL;
     self->wanted.name = (count > 2) ? words[2] : NULL;

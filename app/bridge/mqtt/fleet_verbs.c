@@ -102,7 +102,7 @@ static int write_file(const console_t *self, const char *path) {
 /// Returns false if the output is closed.
 static bool show(const console_t *self, const fleet_wanted_t *wanted) {
     if (wanted->json) {
-        fleet_tell(&self->fleet, self->now_us, stdout);
+        fleet_print(&self->fleet, self->now_us, stdout);
         return true;
     }
     if (wanted->seconds == 0U && isatty(STDOUT_FILENO) == 1) {

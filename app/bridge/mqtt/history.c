@@ -167,7 +167,7 @@ static bool note(history_t *self, history_machine_t *machine, const iwc_message_
             take_back(&machine->missing, &self->missing);
         }
         if (late && is_stop) {
-            take_back(&machine->unheard, &self->unheard);
+            take_back(&machine->stops_missing, &self->stops_missing);
         }
         return late;
     }
@@ -180,7 +180,7 @@ static bool note(history_t *self, history_machine_t *machine, const iwc_message_
     machine->event_us = iwc_integer(event, "heard_wall_us").value;
     const iwc_value_t stop = iwc_integer(event, "number");
     if (is_stop && stop.known && stop.value > 0) {
-        machine->unheard += gap((uint64_t)machine->stop, (uint64_t)stop.value);
+        machine->stops_missing += gap((uint64_t)machine->stop, (uint64_t)stop.value);
         machine->stop = stop.value;
         machine->stop_wall_us = iwc_integer(event, "wall_us").value;
     }
@@ -190,7 +190,7 @@ static bool note(history_t *self, history_machine_t *machine, const iwc_message_
 /// Clears the gap, because it is reported or lies before the span.
 static void forget_gap(history_machine_t *machine) {
     machine->missing = 0;
-    machine->unheard = 0;
+    machine->stops_missing = 0;
     machine->began = false;
 }
 
@@ -254,9 +254,9 @@ static void show(const history_t *self, const history_machine_t *machine, const 
         (void)snprintf(words, sizeof words, "events before this one are not in the stream: %s", cause);
         history_note(self, machine, machine->missing, words);
     }
-    if (machine->unheard > 0U) {
-        history_note(self, machine, machine->unheard,
-                     "stops before this one are not in the stream; what it recorded: iwheel-fleet recordings ID");
+    if (machine->stops_missing > 0U) {
+        history_note(self, machine, machine->stops_missing,
+                     "stops before this one are not in the stream; to list its recordings: iwheel-fleet recordings ID");
     }
     (void)fprintf(self->out, "%-19s %-12s %-6s %s%s", when, machine->id, name, text,
                   (iwc_truth(event, "missed").value == 1) ? " (reported late: its bridge did not run)" : "");
@@ -278,7 +278,7 @@ static void print_event(const history_t *self, const history_machine_t *machine,
     iwn_out_int(&json, "wall_us", times_us[0]);
     iwn_out_int(&json, "stored_wall_us", times_us[1]);
     iwn_out_int(&json, "missing_before", (int64_t)machine->missing);
-    iwn_out_int(&json, "stops_missing_before", (int64_t)machine->unheard);
+    iwn_out_int(&json, "stops_missing_before", (int64_t)machine->stops_missing);
     iwn_out_bool(&json, "bridge_began_anew", machine->began);
     if (machine->missing > 0U) {
         char cause[128];
@@ -336,7 +336,7 @@ bool history_take(void *context, const char *topic, const char *payload, size_t 
         show(self, machine, &event, name, times_us);
     }
     self->missing += machine->missing;
-    self->unheard += machine->unheard;
+    self->stops_missing += machine->stops_missing;
     forget_gap(machine);
     machine->printed = true;
     self->printed++;
@@ -355,7 +355,7 @@ void history_sum(const history_t *self, const char *host) {
                       "{\"events\":%" PRIu64 ",\"machines\":%zu,\"doubled\":%" PRIu64 ",\"garbled\":%" PRIu64
                       ",\"missing\":%" PRIu64 ",\"stops_missing\":%" PRIu64
                       ",\"end_checked\":%s,\"since_wall_us\":%" PRId64 ",\"until_wall_us\":%" PRId64 "}\n",
-                      self->printed, machines, self->doubled, self->garbled, self->missing, self->unheard,
+                      self->printed, machines, self->doubled, self->garbled, self->missing, self->stops_missing,
                       self->has_info ? "true" : "false", self->config.since_us, self->config.until_us);
         return;
     }
@@ -370,8 +370,8 @@ void history_sum(const history_t *self, const char *host) {
     if (self->garbled > 0U) {
         (void)fprintf(self->out, "; %" PRIu64 " unreadable", self->garbled);
     }
-    if (self->missing + self->unheard > 0U) {
-        (void)fprintf(self->out, "; MISSING: %" PRIu64 " stops, %" PRIu64 " events of any kind", self->unheard,
+    if (self->missing + self->stops_missing > 0U) {
+        (void)fprintf(self->out, "; MISSING: %" PRIu64 " stops, %" PRIu64 " events of any kind", self->stops_missing,
                       self->missing);
     }
     if (!self->has_info) {

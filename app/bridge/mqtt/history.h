@@ -61,9 +61,9 @@ typedef struct {
     history_info_t info;
     history_gap_t gaps[HISTORY_GAPS]; ///< Newest gaps: a late event in a gap is not a duplicate.
     size_t next_gap;
-    uint64_t missing; ///< Missing events before the next printed one.
-    uint64_t unheard; ///< Missing stops before the next printed event.
-    bool began;       ///< Its bridge restarted before the next printed event.
+    uint64_t missing;       ///< Missing events before the next printed one.
+    uint64_t stops_missing; ///< Missing stops before the next printed event.
+    bool began;             ///< Its bridge restarted before the next printed event.
     bool printed;
 } history_machine_t;
 
@@ -76,7 +76,7 @@ typedef struct {
     uint64_t doubled;
     uint64_t garbled; ///< Includes events of machines beyond FLEET_MACHINES.
     uint64_t missing;
-    uint64_t unheard;
+    uint64_t stops_missing;
     bool has_info; ///< The broker accepted the connection that reads the `info` of the machines.
     iwn_work_t work;
 } history_t;

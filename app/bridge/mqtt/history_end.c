@@ -84,7 +84,7 @@ static void show_end(const history_t *self, const history_machine_t *machine, ui
     if (stops > 0U) {
         (void)snprintf(words, sizeof words,
                        "stops after its last one here are not in the stream; its info names stop %" PRId64
-                       " of %s; what it recorded: iwheel-fleet recordings ID",
+                       " of %s; to list its recordings: iwheel-fleet recordings ID",
                        machine->info.stop, when);
         history_note(self, machine, stops, words);
     }
@@ -120,12 +120,12 @@ void history_end(history_t *self) {
         const history_machine_t *machine = &self->machines[i];
         const bool selected = self->config.machine == NULL || strcmp(self->config.machine, machine->id) == 0;
         const uint64_t events = machine->missing + events_behind(self, machine);
-        const uint64_t stops = machine->unheard + stops_behind(self, machine);
+        const uint64_t stops = machine->stops_missing + stops_behind(self, machine);
         if (!selected || events + stops == 0U) {
             continue;
         }
         self->missing += events;
-        self->unheard += stops;
+        self->stops_missing += stops;
         if (self->config.json) {
             print_end(self, machine, events, stops);
         } else {

@@ -16,7 +16,7 @@ static int loop(mqtt_bridge_t *bridge) {
         return EX_UNAVAILABLE;
     }
     bridge_service_open(&service);
-    bridge_service_tell(&service, "READY=1");
+    bridge_service_notify(&service, "READY=1");
     bool goes_on = true;
     while (goes_on) {
         const int code = mqtt_bridge_step(bridge, bridge_now_us());
@@ -30,7 +30,7 @@ static int loop(mqtt_bridge_t *bridge) {
         goes_on = bridge_service_wait(waits, 2, mqtt_bridge_wait_ms(bridge));
         bridge_service_round(&service, bridge_now_us());
     }
-    bridge_service_tell(&service, "STOPPING=1");
+    bridge_service_notify(&service, "STOPPING=1");
     return 0;
 }
 

@@ -262,7 +262,7 @@ static int no_spool(const mqtt_settings_t *settings) {
         why = "it is a symbolic link, or not a directory";
     }
     (void)fprintf(stderr,
-                  "iwheel-mqtt: %s: %s; make it, for this bridge alone, or name another one as directory under "
+                  "iwheel-mqtt: %s: %s; create it for this bridge alone, or set another directory under "
                   "[spool]\n",
                   settings->spool.directory, why);
     return EX_CANTCREAT;
@@ -270,7 +270,7 @@ static int no_spool(const mqtt_settings_t *settings) {
 
 int mqtt_bridge_check(const mqtt_settings_t *settings) {
     mqtt_broker_t broker;
-    const mqtt_broker_listener_t nobody = {0};
+    const mqtt_broker_listener_t no_listener = {0};
     if (!has_name(settings)) {
         return EX_CONFIG;
     }
@@ -280,12 +280,13 @@ int mqtt_bridge_check(const mqtt_settings_t *settings) {
         return no_spool(settings);
     }
     if (unwritten != 0) {
-        (void)fprintf(stderr,
-                      "iwheel-mqtt: warning: %s: %s: the bridge starts, but at its end it loses every event that the "
-                      "broker does not have yet; let it write there, or set another directory under [spool]\n",
-                      settings->spool.directory, strerror(unwritten));
+        (void)fprintf(
+            stderr,
+            "iwheel-mqtt: warning: %s: %s: the bridge starts, but when it ends, it loses every event that "
+            "the broker does not have yet; make the directory writable for it, or set another one under [spool]\n",
+            settings->spool.directory, strerror(unwritten));
     }
-    const int code = mqtt_broker_open(&broker, settings, &nobody);
+    const int code = mqtt_broker_open(&broker, settings, &no_listener);
     (void)mqtt_broker_close(&broker);
     return code;
 }

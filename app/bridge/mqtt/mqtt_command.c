@@ -4,6 +4,7 @@
 #include "mqtt_settings.h"
 
 #include "iwheel_northbound/json_out.h"
+#include "iwheel_northbound/request.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -21,7 +22,7 @@ typedef struct {
 static const form_t forms[MQTT_VERBS] = {
     [MQTT_HELLO] = {"hello", false, {NULL}},
     [MQTT_STOP] = {"stop", false, {NULL}},
-    [MQTT_ESTOP] = {"estop", false, {"reason", NULL}},
+    [MQTT_ESTOP] = {"estop", false, {NULL}}, // copy_reason copies its reason.
     [MQTT_ARM] = {"arm", true, {"takeover", NULL}},
     [MQTT_DRIVE] = {"drive", true, {"left_mm_s", "right_mm_s", "left_mA", "right_mA", NULL}},
     [MQTT_TWIST] = {"twist", true, {"v_mm_s", "yaw_mrad_s", NULL}},
@@ -99,6 +100,19 @@ static bool copy_field(iwn_json_t root, const char *name, iwn_out_t *out) {
     return false;
 }
 
+/// Copies the part of the reason that the gateway can use: no reason prevents a stop.
+static void copy_reason(iwn_json_t root, iwn_out_t *out) {
+    char text[IWN_REASON_MAX + 1U] = "";
+    iwn_json_t value;
+    if (iwn_json_find(root, "reason", &value)) {
+        (void)iwn_json_text(value, text, sizeof text); // Cuts a text that is too long.
+        iwn_plain_blank(text);
+    }
+    if (text[0] != '\0') {
+        iwn_out_text(out, "reason", text);
+    }
+}
+
 static bool is_drive(mqtt_verb_t verb) {
     return verb == MQTT_DRIVE || verb == MQTT_TWIST;
 }
@@ -117,13 +131,13 @@ static bool read_drive(iwn_json_t root, mqtt_order_t *order) {
     return !iwn_json_find(root, "key", &value) || text_of(root, "key", order->key, sizeof order->key);
 }
 
-/// Returns true if there are only fields that are common to all commands, or of this verb.
+/// Returns true if there are only fields that are common to all commands, or of this verb. A stop may have any.
 static bool is_of_fields(iwn_json_t root, mqtt_verb_t verb) {
     static const char *const common[] = {"boot", "t_us", "ttl_ms", "seq", "from", NULL};
     iwn_json_t rest = iwn_json_inside(root);
     iwn_json_t name;
     iwn_json_t value;
-    while (iwn_json_next(&rest, &name, &value)) {
+    while (!is_stop(verb) && iwn_json_next(&rest, &name, &value)) {
         const bool is_key = is_drive(verb) && iwn_json_is(name, "key"); // The bridge judges it.
         if (!is_one_of(name, common) && !is_one_of(name, forms[verb].fields) && !is_key) {
             return false;
@@ -144,6 +158,9 @@ static bool write_request(iwn_json_t root, mqtt_order_t *order) {
     bool good = true;
     for (size_t i = 0; form->fields[i] != NULL; i++) {
         good = copy_field(root, form->fields[i], &out) && good;
+    }
+    if (order->verb == MQTT_ESTOP) {
+        copy_reason(root, &out);
     }
     if (order->verb == MQTT_ARM) {
         char who[MQTT_SENDER_SIZE + 8U] = "mqtt ";
@@ -192,7 +209,7 @@ static int64_t ttl_of(const mqtt_rules_t *rules, iwn_json_t root, mqtt_verb_t ve
     return (asked_ms < most_ms) ? asked_ms : most_ms;
 }
 
-static bool judge_age(const mqtt_rules_t *rules, iwn_json_t root, uint64_t now_us, mqtt_order_t *order) {
+static bool judge_age(const mqtt_rules_t *rules, iwn_json_t root, uint64_t gateway_us, mqtt_order_t *order) {
     char boot[MQTT_BOOT_SIZE] = "";
     int64_t logged_us = -1;
     const int64_t ttl_ms = ttl_of(rules, root, order->verb);
@@ -204,11 +221,11 @@ static bool judge_age(const mqtt_rules_t *rules, iwn_json_t root, uint64_t now_u
     if (strcmp(boot, rules->boot) != 0) {
         return drop(order, MQTT_OTHER_BOOT, "send it again with boot and t_us of this reply");
     }
-    if ((uint64_t)logged_us > now_us) {
+    if ((uint64_t)logged_us > gateway_us) {
         return drop(order, MQTT_EARLY,
                     "t_us is ahead of this machine; send it again with t_us of this reply, unchanged");
     }
-    if (now_us - (uint64_t)logged_us > (uint64_t)ttl_ms * 1000U) {
+    if (gateway_us - (uint64_t)logged_us > (uint64_t)ttl_ms * 1000U) {
         return drop(order, MQTT_LATE,
                     "too long on the way, or t_us of an old message; send it again with t_us of this reply");
     }
@@ -268,14 +285,15 @@ static bool read_labels(const mqtt_rules_t *rules, const mqtt_command_t *command
 static bool read_command(mqtt_judge_t *self, const mqtt_command_t *command, iwn_json_t *out_root, mqtt_order_t *order) {
     char fault[80];
     iwn_text_t words = iwn_text_begin(fault, sizeof fault);
-    if (command->length > MQTT_COMMAND_MAX ||
-        !iwn_json_check(command->payload, command->length, &self->work, out_root, &words) ||
+    const bool known = find_verb(command->verb, &order->verb);
+    const size_t most = is_stop(order->verb) ? IWN_JSON_MAX : MQTT_COMMAND_MAX; // The reason may be long.
+    if (command->length > most || !iwn_json_check(command->payload, command->length, &self->work, out_root, &words) ||
         iwn_json_kind(*out_root) != IWN_JSON_OBJECT || !text_of(*out_root, "from", order->from, sizeof order->from) ||
         !mqtt_settings_is_name(order->from)) {
         order->from[0] = '\0';
         return drop(order, MQTT_GARBLED, "not a JSON object with a name in from");
     }
-    if (!find_verb(command->verb, &order->verb)) {
+    if (!known) {
         return drop(order, MQTT_GARBLED, "there is no such command");
     }
     if (!number_of(*out_root, "seq", &order->seq) || order->seq < 1) {
@@ -312,7 +330,7 @@ static bool judge_command(mqtt_judge_t *self, const mqtt_rules_t *rules, const m
     if (order->verb == MQTT_HELLO) {
         return true;
     }
-    if (!judge_age(rules, root, now_us, order) || !judge_count(self, now_us, order)) {
+    if (!judge_age(rules, root, now_us + (uint64_t)rules->ahead_us, order) || !judge_count(self, now_us, order)) {
         return false;
     }
     return is_allowed(rules, order->verb) ||

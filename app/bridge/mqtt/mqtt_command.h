@@ -5,8 +5,9 @@
 /// Pure: no I/O, no clock, no heap. A command quotes `boot` and `t_us` of a message of this machine, and has a sender
 /// name `from` and a `seq` that increases. Its age is the monotonic time of this machine since `t_us`; no other clock
 /// is used. Commands that are retained, late, duplicated, out of order or from another run of the bridge are dropped
-/// and counted. A stop only needs its age: neither `seq` nor the number of senders refuses it. `from` is a label: any
-/// client with the right to publish may use any name. The right to drive is the `key` of the reply to `arm`.
+/// and counted. A stop only needs its age: no `seq`, number of senders, unknown field or reason refuses it. The usable
+/// part of the reason is passed on. `from` is a label: any client with the right to publish may use any name. The right
+/// to drive is the `key` of the reply to `arm`.
 ///
 /// A response topic of MQTT 5 is valid only among the replies of this machine, so that no client makes the bridge write
 /// to other topics.
@@ -17,7 +18,7 @@
 
 /// Largest age of a command.
 #define MQTT_TTL_MAX_MS 1000U
-/// Largest command in bytes. A longer one is not parsed.
+/// Largest command in bytes. A longer one is not parsed, except a stop with at most IWN_JSON_MAX.
 #define MQTT_COMMAND_MAX 4096U
 #define MQTT_SENDER_SIZE 33U
 /// Size of a key with its terminator.
@@ -62,6 +63,7 @@ typedef struct {
     bool may_drive;
     bool may_reset;
     const char *replies; ///< `iwheel/ID/reply/`: required prefix of a response topic.
+    int64_t ahead_us;    ///< The gateway's clock, as in `t_us`, is ahead of `now_us` by this time.
 } mqtt_rules_t;
 
 /// Command as received.

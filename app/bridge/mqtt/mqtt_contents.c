@@ -107,11 +107,11 @@ size_t mqtt_write_missed_stop(const char *boot, uint64_t number, int64_t wall_us
     return end(&out);
 }
 
-size_t mqtt_write_answer(const char *boot, uint64_t now_us, const mqtt_order_t *order, const iwc_message_t *reply,
+size_t mqtt_write_answer(const char *boot, uint64_t gateway_us, const mqtt_order_t *order, const iwc_message_t *reply,
                          mqtt_buffer_t buffer) {
     iwn_out_t out = begin(buffer);
     iwn_out_text(&out, "boot", boot);
-    iwn_out_int(&out, "t_us", (int64_t)now_us);
+    iwn_out_int(&out, "t_us", (int64_t)gateway_us);
     iwn_out_text(&out, "cmd", mqtt_verb_word(order->verb));
     iwn_out_known(&out, "seq", order->seq > 0, order->seq);
     if (order->verb == MQTT_ARM && order->key[0] != '\0' && iwc_json(reply, "key", &(size_t){0}) == NULL) {
@@ -207,7 +207,8 @@ static const sensor_t sensors[] = {
     {"binary_sensor", "estop", "Emergency stop pressed",
      "None if value_json.estop.state == 'none' else 'OFF' if value_json.estop.state == 'released' else 'ON'", NULL,
      "problem"},
-    {"binary_sensor", "bus", "Bus down", "'OFF' if value_json.bus.state == 'active' else 'ON'", NULL, "problem"},
+    {"binary_sensor", "bus", "Bus down", "'OFF' if value_json.bus.state in ['active', 'passive'] else 'ON'", NULL,
+     "problem"},
     {"sensor", "battery_left", "Battery left",
      "value_json.left.battery_dV / 10 if value_json.left.battery_dV is number else None", "V", "voltage"},
     {"sensor", "battery_right", "Battery right",

@@ -42,7 +42,7 @@ size_t mqtt_write_missed_stop(const char *boot, uint64_t number, int64_t wall_us
 /// Writes the answer to a command: the command, `boot`, the current `t_us`, and the reply of the gateway. Without a
 /// reply (NULL) it states whether the command was accepted, and otherwise why not. `order->key` of an `arm`, unless
 /// empty, is added if the reply has no key.
-size_t mqtt_write_answer(const char *boot, uint64_t now_us, const mqtt_order_t *order, const iwc_message_t *reply,
+size_t mqtt_write_answer(const char *boot, uint64_t gateway_us, const mqtt_order_t *order, const iwc_message_t *reply,
                          mqtt_buffer_t out);
 
 /// Last stop of a machine in `info`, for clients that missed its event.

@@ -47,7 +47,8 @@ static void answer(mqtt_bridge_t *self, const mqtt_order_t *order, const iwc_mes
                                        .correlation = (order->correlation_length > 0U) ? order->correlation : NULL,
                                        .correlation_length = order->correlation_length}};
     if (order->to[0] != '\0') {
-        const size_t length = mqtt_write_answer(self->boot, self->now_us, order, reply,
+        const uint64_t gateway_us = self->now_us + (uint64_t)bridge_link_ahead_us(&self->link, self->now_us);
+        const size_t length = mqtt_write_answer(self->boot, gateway_us, order, reply,
                                                 (mqtt_buffer_t){self->payload, sizeof self->payload});
         (void)mqtt_bridge_publish(self, "reply", order->to, length, way);
     }
@@ -131,39 +132,35 @@ static void refuse_mover(mqtt_bridge_t *self, const mqtt_order_t *order, const c
     decline(self, order, "stale_command", message);
 }
 
-static void arm(mqtt_bridge_t *self, const mqtt_order_t *order) {
+static bridge_lease_result_t ask_lease(mqtt_bridge_t *self, const mqtt_order_t *order) {
     waiting_t *place = place_for(self, order);
-    const bridge_lease_result_t result = (place == NULL)
-                                             ? BRIDGE_LEASE_FULL
-                                             : bridge_lease_arm(&self->lease, order->from, order->request,
-                                                                (bridge_asker_t){take_answer, place}, self->now_us);
-    if (result == BRIDGE_LEASE_OK) {
-        return;
+    const bridge_asker_t asker = {take_answer, place};
+    if (place == NULL) {
+        return BRIDGE_LEASE_FULL;
     }
-    if (place != NULL) {
+    const bridge_lease_result_t result =
+        (order->verb == MQTT_ARM) ? bridge_lease_arm(&self->lease, order->from, order->request, asker, self->now_us)
+                                  : bridge_lease_drive(&self->lease, order->key, order->request, asker, self->now_us);
+    if (result != BRIDGE_LEASE_OK) {
         place->used = false;
     }
+    return result;
+}
+
+static void arm(mqtt_bridge_t *self, const mqtt_order_t *order) {
+    const bridge_lease_result_t result = ask_lease(self, order);
     if (result == BRIDGE_LEASE_AWAY) {
         not_delivered(self, order);
-    } else {
+    } else if (result != BRIDGE_LEASE_OK) {
         decline(self, order, "busy", "another person requests the lease at this moment; arm again");
     }
 }
 
 static void drive(mqtt_bridge_t *self, const mqtt_order_t *order) {
-    waiting_t *place = place_for(self, order);
-    const bridge_lease_result_t result = (place == NULL)
-                                             ? BRIDGE_LEASE_FULL
-                                             : bridge_lease_drive(&self->lease, order->key, order->request,
-                                                                  (bridge_asker_t){take_answer, place}, self->now_us);
+    const bridge_lease_result_t result = ask_lease(self, order);
     if (result == BRIDGE_LEASE_OK) {
         self->silent_us = self->now_us + MQTT_SILENT_US;
-        return;
-    }
-    if (place != NULL) {
-        place->used = false;
-    }
-    if (result == BRIDGE_LEASE_WRONG) {
+    } else if (result == BRIDGE_LEASE_WRONG) {
         decline(self, order, "not_holder",
                 "its key is not that of the lease: it has not armed, was stopped, or another person drives; arm, and "
                 "send the key of the reply");
@@ -193,8 +190,12 @@ void mqtt_bridge_command(void *context, const struct mosquitto_message *message,
     mqtt_bridge_t *self = context;
     static mqtt_order_t order;
     char replies[MQTT_TOPIC_SIZE];
-    const mqtt_rules_t rules = {self->boot, self->settings->drive.ttl_ms, self->settings->drive.enabled,
-                                self->settings->drive.allow_reset, replies};
+    const mqtt_rules_t rules = {self->boot,
+                                self->settings->drive.ttl_ms,
+                                self->settings->drive.enabled,
+                                self->settings->drive.allow_reset,
+                                replies,
+                                bridge_link_ahead_us(&self->link, self->now_us)};
     mqtt_topic(self->settings->machine.id, "reply", "", replies);
     const char *verb = mqtt_topic_verb(self->settings->machine.id, message->topic);
     if (verb == NULL) {

@@ -45,8 +45,8 @@ void mqtt_sensors_poll(mqtt_bridge_t *self) {
     if (seen < self->sensors_sent) {
         (void)fprintf(
             stderr,
-            "iwheel-mqtt: Home Assistant sensors that the broker forwarded: %zu of %zu; let this user write and "
-            "read %s\n",
+            "iwheel-mqtt: Home Assistant sensors that the broker forwarded: %zu of %zu; permit this user to write "
+            "and read %s\n",
             seen, self->sensors_sent, self->sensors);
     }
 }

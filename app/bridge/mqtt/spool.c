@@ -160,7 +160,7 @@ static void close_file(mqtt_spool_t *self) {
 }
 
 /// Writes the whole spool into a new file, which then replaces the old one. A complete file exists at any time.
-static bool write_anew(mqtt_spool_t *self) {
+static bool rewrite(mqtt_spool_t *self) {
     uint8_t first[DONE_SIZE];
     uint8_t last[DONE_SIZE];
     const bool empty = self->begin == self->end;
@@ -194,7 +194,7 @@ static bool write_anew(mqtt_spool_t *self) {
 /// Appends a record. An incomplete record is removed, because records after it would not be read.
 static bool append(mqtt_spool_t *self, const uint8_t *record, size_t length) {
     if (self->behind || self->file_bytes + length > 2U * self->size) {
-        return write_anew(self);
+        return rewrite(self);
     }
     if (!write_all(self->file, record, length)) {
         self->behind = true;
@@ -290,7 +290,7 @@ bool mqtt_spool_open(mqtt_spool_t *self, const char *directory, size_t max_bytes
         return false;
     }
     read_file(self, file);
-    (void)write_anew(self);
+    (void)rewrite(self);
     return true;
 }
 
@@ -365,7 +365,7 @@ void mqtt_spool_confirm_aside(mqtt_spool_t *self, uint64_t number) {
 
 void mqtt_spool_poll(mqtt_spool_t *self) {
     if (self->behind) {
-        (void)write_anew(self);
+        (void)rewrite(self);
     }
 }
 

@@ -36,7 +36,7 @@ static ros_age_t judge_absolutely(int64_t sent_us, ros_moment_t now, int64_t *ou
     return (*out_age_us > ROS_OLD_US) ? ROS_AGE_LATE : ROS_AGE_FRESH;
 }
 
-static void begin_anew(ros_source_t *entry, int64_t sent_us, int64_t now_us) {
+static void begin_again(ros_source_t *entry, int64_t sent_us, int64_t now_us) {
     entry->known = false;
     entry->first_sent_us = sent_us;
     entry->first_received_us = now_us;
@@ -55,7 +55,7 @@ static ros_source_t *source_of(ros_ages_t *self, uint64_t source, int64_t sent_u
         }
     }
     *oldest = (ros_source_t){.source = source, .received_us = now_us, .sent_us = sent_us};
-    begin_anew(oldest, sent_us, now_us);
+    begin_again(oldest, sent_us, now_us);
     return oldest;
 }
 
@@ -65,14 +65,14 @@ static bool has_gap(const ros_source_t *entry, int64_t sent_us, int64_t now_us) 
 
 /// Learns from one sample of a writer that is not known.
 static void learn(ros_source_t *entry, int64_t sent_us, int64_t now_us) {
-    const int64_t heard_span_us = now_us - entry->first_received_us;
+    const int64_t received_span_us = now_us - entry->first_received_us;
     const int64_t sent_span_us = sent_us - entry->first_sent_us;
-    if (sent_span_us - heard_span_us > ROS_LEARN_US / TENTH) {
-        begin_anew(entry, sent_us, now_us); // The network held the first sample back for longer than this one.
+    if (sent_span_us - received_span_us > ROS_LEARN_US / TENTH) {
+        begin_again(entry, sent_us, now_us); // The network held the first sample back for longer than this one.
         return;
     }
-    entry->known = heard_span_us >= ROS_LEARN_US && sent_span_us >= ROS_LEARN_US &&
-                   llabs(heard_span_us - sent_span_us) <= heard_span_us / TENTH;
+    entry->known = received_span_us >= ROS_LEARN_US && sent_span_us >= ROS_LEARN_US &&
+                   llabs(received_span_us - sent_span_us) <= received_span_us / TENTH;
 }
 
 static ros_age_t judge_by_writer(ros_ages_t *self, uint64_t source, int64_t sent_us, int64_t now_us,
@@ -80,7 +80,7 @@ static ros_age_t judge_by_writer(ros_ages_t *self, uint64_t source, int64_t sent
     ros_source_t *entry = source_of(self, source, sent_us, now_us);
     const int64_t way_us = now_us - sent_us;
     if (has_gap(entry, sent_us, now_us)) {
-        begin_anew(entry, sent_us, now_us);
+        begin_again(entry, sent_us, now_us);
     } else if (sent_us < entry->sent_us) {
         *out_age_us = way_us - entry->least_us;
         return ROS_AGE_OVERTAKEN;

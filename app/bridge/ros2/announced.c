@@ -27,14 +27,16 @@ static bool begins_a_sample(const rtps_part_t *part) {
     return part->bytes[0] == DATA && part->size >= DATA_HEADER;
 }
 
-/// Returns true if a writer sent it that announces participants, writers or readers (RTPS 2.2, table 9.2).
-static bool is_announcement(const rtps_part_t *part) {
-    static const uint8_t writers[3][4] = {{0, 1, 0, 0xC2}, {0, 0, 3, 0xC2}, {0, 0, 4, 0xC2}};
-    bool found = false;
-    for (size_t i = 0; i < 3U && begins_a_sample(part); i++) {
-        found = found || memcmp(part->bytes + DATA_WRITER_AT, writers[i], sizeof writers[i]) == 0;
+typedef enum { OF_A_WRITER = 0, OF_A_READER, OF_A_PARTICIPANT, NO_ANNOUNCEMENT } announcement_t;
+
+/// Returns the kind of announcement, by the writer that sent it (RTPS 2.2, table 9.2).
+static announcement_t announcement_of(const rtps_part_t *part) {
+    static const uint8_t writers[NO_ANNOUNCEMENT][4] = {{0, 0, 3, 0xC2}, {0, 0, 4, 0xC2}, {0, 1, 0, 0xC2}};
+    unsigned kind = begins_a_sample(part) ? OF_A_WRITER : NO_ANNOUNCEMENT;
+    while (kind < NO_ANNOUNCEMENT && memcmp(part->bytes + DATA_WRITER_AT, writers[kind], sizeof writers[kind]) != 0) {
+        kind++;
     }
-    return found;
+    return (announcement_t)kind;
 }
 
 /// Walks a list of parameters from `at`. Returns the position behind the list; 0: the list does not end within `size`.
@@ -69,14 +71,18 @@ static void drop_of(uint8_t *bytes, const rtps_part_t *part) {
     (void)walk(bytes, part->size, at + ENCAPSULATION, bytes[at + 1U] == 3U, true);
 }
 
-void rtps_drop_large_data(uint8_t *message, size_t length) {
+bool rtps_drop_large_data(uint8_t *message, size_t length) {
     rtps_part_t part;
+    bool has_writer = false;
     if (length < RTPS_HEADER || memcmp(message, "RTPS", 4) != 0) {
-        return;
+        return false;
     }
     for (size_t at = RTPS_HEADER; at < length && rtps_part_at(message, length, at, &part); at += part.size) {
-        if (is_announcement(&part)) {
+        const announcement_t kind = announcement_of(&part);
+        if (kind != NO_ANNOUNCEMENT) {
             drop_of(message + at, &part);
         }
+        has_writer = has_writer || kind == OF_A_WRITER;
     }
+    return has_writer;
 }

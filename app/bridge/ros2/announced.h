@@ -14,7 +14,7 @@
 #define ANNOUNCED_DATA_MAX 512U
 
 /// Changes the message in place; its length stays. Behind damage, and in other data than an RTPS message, nothing
-/// changes.
-void rtps_drop_large_data(uint8_t *message, size_t length);
+/// changes. Returns true if the message announces a writer, or the end of one.
+bool rtps_drop_large_data(uint8_t *message, size_t length);
 
 #endif

@@ -6,6 +6,11 @@
 #define BACKOFF_MAX_US 2000000
 /// The gateway made a snapshot after the grant of the lease if the bridge received it this much later than the grant.
 #define GRANTED_US 200000
+/// The least rate with which the bridge detects a change within 0.2 s.
+#define LEAST_HZ 20U
+/// Interval between two checks whether a node uses the bridge, and the time after the last use with the full rate.
+#define USED_CHECK_US 100000
+#define USED_AFTER_US 1000000
 
 int64_t bridge_monotonic_us(void) {
     return (int64_t)bridge_now_us();
@@ -29,11 +34,11 @@ void bridge_lose(bridge_t *self, const char *why) {
     // The share that varies prevents several bridges from connecting to the same gateway at the same moment.
     self->retry_us = bridge_monotonic_us() + self->backoff_us * 3 / 4 + bridge_monotonic_us() % (self->backoff_us / 2);
     self->backoff_us = (self->backoff_us < BACKOFF_MAX_US / 2) ? self->backoff_us * 2 : BACKOFF_MAX_US;
-    if (!self->told_gone) {
+    if (!self->gone_reported) {
         (void)fprintf(stderr, "iwheel-ros2: warning: no gateway at %s: %s; retrying\n", self->settings.gateway.socket,
                       why);
     }
-    self->told_gone = true;
+    self->gone_reported = true;
 }
 
 /// Reads the last stop that the gateway reports. This bridge did not cause it: it happened before the connection.
@@ -81,6 +86,36 @@ static void take_snapshot(bridge_t *self, const iwc_message_t *message) {
     }
 }
 
+/// Returns true while a node uses the bridge and some time after that, as of the last check.
+static bool is_used(const bridge_t *self) {
+    return self->used_next_us - self->used_us < USED_CHECK_US + USED_AFTER_US;
+}
+
+static unsigned full_rate_hz(const bridge_t *self) {
+    return (self->settings.odometry.rate_hz < LEAST_HZ) ? LEAST_HZ : self->settings.odometry.rate_hz;
+}
+
+void bridge_choose_rate(bridge_t *self, int64_t now) {
+    char request[128];
+    if (self->facts.link == ROS_LINK_GONE || now < self->used_next_us) {
+        return;
+    }
+    self->used_next_us = now + USED_CHECK_US;
+    if (self->leased_us != 0 || ros_is_used(self->ros)) {
+        self->used_us = now;
+    }
+    const unsigned rate_hz = is_used(self) ? full_rate_hz(self) : LEAST_HZ;
+    if (rate_hz == self->rate_hz) {
+        return;
+    }
+    (void)snprintf(request, sizeof request,
+                   "{\"cmd\":\"watch\",\"topics\":[\"state\",\"bus\",\"estop\",\"lease\",\"stop\"],\"rate_hz\":%u}",
+                   rate_hz);
+    if (iwc_send(self->gateway, request, 0, &self->rate_id) == IWC_OK) { // Otherwise the next check tries again.
+        self->rate_hz = rate_hz;
+    }
+}
+
 iwc_result_t bridge_call(bridge_t *self) {
     const unsigned topics = IWC_WATCH_STATE | IWC_WATCH_BUS | IWC_WATCH_ESTOP | IWC_WATCH_LEASE | IWC_WATCH_STOP;
     iwc_message_t status;
@@ -100,16 +135,18 @@ iwc_result_t bridge_call(bridge_t *self) {
     if (result == IWC_OK) {
         self->assumptions_due = true;
         take_snapshot(self, &status);
-        // 20 Hz is the least rate with which the bridge detects a change within 0.2 s.
-        const int rate_hz = (self->settings.odometry.rate_hz < 20U) ? 20 : (int)self->settings.odometry.rate_hz;
-        result = iwc_watch(self->gateway, topics, rate_hz, BRIDGE_ASK_MS);
+        self->rate_hz = full_rate_hz(self);
+        self->rate_id = 0;
+        self->used_us = bridge_monotonic_us();
+        self->used_next_us = self->used_us;
+        result = iwc_watch(self->gateway, topics, (int)self->rate_hz, BRIDGE_ASK_MS);
     }
     if (result != IWC_OK) {
         bridge_lose(self, (result == IWC_REFUSED) ? iwc_reason(self->gateway) : iwc_words(result));
         return result;
     }
     self->backoff_us = BRIDGE_BACKOFF_US;
-    self->told_gone = false;
+    self->gone_reported = false;
     (void)fprintf(
         stderr, "iwheel-ros2: info: connected to %s%s\n", self->settings.gateway.socket,
         newer ? ", whose protocol is newer: this bridge only watches and stops; install the iwheel-ros2 of its version"
@@ -134,9 +171,14 @@ static void take_stop(bridge_t *self, const iwc_message_t *event) {
     bridge_end_lease(self);
 }
 
-/// Handles a reply to a drive command. The replies to all other requests are read where the request is sent.
+/// Handles a reply to a drive command or to the request for another rate. The replies to all other requests are read
+/// where the request is sent.
 static void take_reply(bridge_t *self, const iwc_message_t *reply) {
     ros_commands_t *commands = &self->facts.commands;
+    if (reply->id == self->rate_id) {
+        self->rate_hz = (iwc_truth(reply, "ok").value == 0) ? 0U : self->rate_hz;
+        return;
+    }
     commands->refusal[0] = '\0';
     if (iwc_truth(reply, "ok").value == 0) {
         commands->refused++;
@@ -163,7 +205,7 @@ void bridge_listen(bridge_t *self) {
     }
     if (result != IWC_TIMEOUT && result != IWC_INTERRUPTED) {
         bridge_lose(self, "it has ended, or closed the connection");
-    } else if (fresh) {
+    } else if (fresh && is_used(self)) {
         ros_publish_motion(self->ros, &self->facts.machine, &self->odometry);
         ros_publish_wrench(self->ros, &self->facts.machine);
     }

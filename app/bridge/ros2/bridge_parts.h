@@ -20,8 +20,13 @@ void bridge_lose(bridge_t *self, const char *why);
 /// Records that this bridge has no lease and no driver any more. Sends nothing.
 void bridge_end_lease(bridge_t *self);
 
-/// Reads all messages of the gateway that are waiting, and publishes motion and wrench if there was a new snapshot.
+/// Reads all messages of the gateway that are waiting, and publishes motion and wrench if there was a new snapshot and a
+/// node uses the bridge.
 void bridge_listen(bridge_t *self);
+
+/// Requests the rate of [odometry] while a node uses the bridge or the bridge holds the lease, and otherwise the least
+/// rate. Does not wait for the reply.
+void bridge_choose_rate(bridge_t *self, int64_t now);
 
 /// Returns `bridge_now_us` as a signed number.
 int64_t bridge_monotonic_us(void);

@@ -93,7 +93,7 @@ static void take_arm(bridge_t *self, const ros_request_t *request, int64_t age_u
         return;
     }
     char words[160];
-    ros_auto_told(&self->auto_arm);
+    ros_auto_reported(&self->auto_arm);
     (void)snprintf(words, sizeof words,
                    "armed: send cmd_vel at %d Hz or more, the first within %d ms; a pause above %d ms stops the wheels",
                    (3000 + terms.lease_ms - 1) / ((terms.lease_ms > 0) ? terms.lease_ms : 1), terms.first_lease_ms,
@@ -123,8 +123,8 @@ static void take_what_permits(bridge_t *self, const ros_request_t *request) {
     } else if (request->verb == ROS_ARM && self->driver != 0) {
         reason = "busy: a publisher of cmd_vel has the wheels until they are stopped; call iwheel/stop, then arm again";
     } else if (request->verb == ROS_RESET && !self->settings.drive.allow_reset) {
-        reason = "not over the network: go to the machine, check it, then call iwheelctl reset; or set [drive] "
-                 "allow_reset = yes in ros2.conf";
+        reason = "reset is not permitted over the network: go to the machine, check it, then call iwheelctl reset; or "
+                 "set [drive] allow_reset = yes in ros2.conf";
     }
     if (reason[0] != '\0') {
         ros_answer(self->ros, request, false, reason);
@@ -135,17 +135,29 @@ static void take_what_permits(bridge_t *self, const ros_request_t *request) {
     }
 }
 
+/// Sends a stop. A bridge that has no connection, because all places of the gateway are in use, sends it to the places
+/// that the gateway keeps for stops.
+static iwc_result_t stop(bridge_t *self, bool estop) {
+    static const char reason[] = "by ROS, iwheel/estop";
+    iwc_result_t result = IWC_CLOSED;
+    if (self->facts.link != ROS_LINK_GONE) {
+        result = estop ? iwc_estop(self->gateway, reason, BRIDGE_ASK_MS) : iwc_stop(self->gateway, BRIDGE_ASK_MS);
+    }
+    if (result == IWC_CLOSED) {
+        const char *socket = self->settings.gateway.socket;
+        result = estop ? iwc_estop_at(self->gateway, socket, reason, BRIDGE_ASK_MS)
+                       : iwc_stop_at(self->gateway, socket, BRIDGE_ASK_MS);
+    }
+    return result;
+}
+
 void bridge_take_request(bridge_t *self, const ros_request_t *request) {
     if (request->verb == ROS_STOP || request->verb == ROS_ESTOP) {
         ros_auto_person_stopped(&self->auto_arm);
         bridge_end_lease(self);
-    }
-    if (self->facts.link == ROS_LINK_GONE) {
+        answer_result(self, request, stop(self, request->verb == ROS_ESTOP));
+    } else if (self->facts.link == ROS_LINK_GONE) {
         ros_answer(self->ros, request, false, "there is no gateway; see /diagnostics");
-    } else if (request->verb == ROS_STOP) {
-        answer_result(self, request, iwc_stop(self->gateway, BRIDGE_ASK_MS));
-    } else if (request->verb == ROS_ESTOP) {
-        answer_result(self, request, iwc_estop(self->gateway, "by ROS, iwheel/estop", BRIDGE_ASK_MS));
     } else {
         take_what_permits(self, request);
     }

@@ -59,6 +59,6 @@ void ros_auto_person_stopped(ros_auto_t *self) {
     self->state = (self->state == ROS_AUTO_WAITING) ? ROS_AUTO_WAITING : ROS_AUTO_STOPPED;
 }
 
-void ros_auto_told(ros_auto_t *self) {
+void ros_auto_reported(ros_auto_t *self) {
     self->state = ROS_AUTO_TRUSTED;
 }

@@ -60,6 +60,6 @@ void ros_auto_stopped(ros_auto_t *self, bool by_our_silence);
 void ros_auto_person_stopped(ros_auto_t *self);
 
 /// Handles a successful call of the service iwheel/arm.
-void ros_auto_told(ros_auto_t *self);
+void ros_auto_reported(ros_auto_t *self);
 
 #endif

@@ -9,16 +9,16 @@
 typedef enum { ROS_OK = 0, ROS_WARN, ROS_ERROR, ROS_STALE } ros_level_t;
 
 typedef enum {
-    ROS_TELLS_GATEWAY = 0,
-    ROS_TELLS_ESTOP,
-    ROS_TELLS_BUS,
-    ROS_TELLS_TIMING,
-    ROS_TELLS_LEFT,
-    ROS_TELLS_RIGHT,
+    ROS_REPORT_GATEWAY = 0,
+    ROS_REPORT_ESTOP,
+    ROS_REPORT_BUS,
+    ROS_REPORT_TIMING,
+    ROS_REPORT_LEFT,
+    ROS_REPORT_RIGHT,
     ROS_REPORTS_ASSUMPTIONS,
-    ROS_TELLS_COMMANDS,
-    ROS_TELLS
-} ros_tells_t;
+    ROS_REPORT_COMMANDS,
+    ROS_REPORTS
+} ros_report_t;
 
 #define ROS_VALUES_MAX 12U
 
@@ -36,7 +36,7 @@ typedef struct {
 } ros_status_t;
 
 /// Writes level, sentence and values of one part to `*out_status`.
-void ros_diagnose(const ros_facts_t *facts, ros_tells_t which, ros_status_t *out_status);
+void ros_diagnose(const ros_facts_t *facts, ros_report_t which, ros_status_t *out_status);
 
 /// Writes the JSON object of the topic iwheel/state. Equal texts mean that nothing has changed.
 void ros_state_json(const ros_facts_t *facts, char *out, size_t size);

@@ -81,6 +81,7 @@ bool ros_facts_lack_values(const iwc_message_t *snapshot) {
 
 void ros_facts_read_config(const iwc_message_t *reply, ros_machine_t *machine) {
     size_t left = 0;
+    machine->assumptions_length = 0;
     const char *at = iwc_json(reply, "keys", &left);
     const char *end = (at != NULL) ? at + left : NULL;
     // The list has objects of two strings. No string has a brace in it.
@@ -122,7 +123,7 @@ static bool is_confirmed(const iwc_message_t *assumptions, const char *item) {
     return iwc_is(assumptions, path, "confirmed");
 }
 
-static void tell_contradiction(const iwc_message_t *assumptions, const char *item, ros_machine_t *machine) {
+static void report_contradiction(const iwc_message_t *assumptions, const char *item, ros_machine_t *machine) {
     char path[48];
     char reason[160];
     char fix[160];
@@ -133,6 +134,17 @@ static void tell_contradiction(const iwc_message_t *assumptions, const char *ite
     const size_t used = strlen(machine->contradicted);
     (void)snprintf(machine->contradicted + used, sizeof machine->contradicted - used, "%s%s: %s; %s",
                    (used > 0) ? ". " : "", item, reason, fix);
+}
+
+/// Returns true if the assumptions are those of the last call; otherwise stores them for the next call.
+static bool are_assumptions_unchanged(ros_machine_t *machine, const iwc_message_t *assumptions) {
+    const size_t length = assumptions->length;
+    if (length == machine->assumptions_length && memcmp(assumptions->text, machine->assumptions, length) == 0) {
+        return true;
+    }
+    machine->assumptions_length = (length <= sizeof machine->assumptions) ? length : 0U;
+    memcpy(machine->assumptions, assumptions->text, machine->assumptions_length);
+    return false;
 }
 
 void ros_facts_read_assumptions(const iwc_message_t *message, ros_machine_t *machine) {
@@ -155,7 +167,7 @@ void ros_facts_read_assumptions(const iwc_message_t *message, ros_machine_t *mac
     char *slash;
     iwc_message_t assumptions = {.is_event = true};
     assumptions.text = iwc_json(message, "ledger", &assumptions.length);
-    if (assumptions.text == NULL) {
+    if (assumptions.text == NULL || are_assumptions_unchanged(machine, &assumptions)) {
         return;
     }
     machine->contradicted[0] = '\0';
@@ -164,7 +176,7 @@ void ros_facts_read_assumptions(const iwc_message_t *message, ros_machine_t *mac
         (void)snprintf(path, sizeof path, "%s.state", items[i]);
         machine->assumed += iwc_is(&assumptions, path, "assumed") ? 1U : 0U;
         if (iwc_is(&assumptions, path, "contradicted")) {
-            tell_contradiction(&assumptions, items[i], machine);
+            report_contradiction(&assumptions, items[i], machine);
         }
     }
     text_of(&assumptions, ROLE, machine, text);

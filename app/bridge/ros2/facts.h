@@ -10,6 +10,8 @@
 #define ROS_SENTENCE_SIZE 600U
 /// Keys of the configuration that odometry and driving depend on.
 #define ROS_CONFIGURED 4U
+/// The assumptions of a gateway have about 4 kB. Longer ones are read each time.
+#define ROS_ASSUMPTIONS_SIZE 8192U
 
 ///     GONE --snapshot--> UP --none for 0.15 s--> SILENT --snapshot--> UP; UP, SILENT --connection lost--> GONE
 typedef enum {
@@ -68,11 +70,13 @@ typedef struct {
     int64_t radius_mm;
     int64_t track_mm; ///< 0: not configured, so the bridge cannot compute turns.
     ros_measures_t measures;
-    bool setpoint_current;                ///< The configuration requires a current, which a twist does not have.
-    char contradicted[ROS_SENTENCE_SIZE]; ///< Contradicted assumptions, with the fix; empty: none.
-    unsigned assumed;                     ///< Assumptions that nothing has verified yet.
-    char stop[ROS_SENTENCE_SIZE];         ///< Sentence of the last stop.
-    iwc_value_t stop_number;              ///< Number of the last stop, as the gateway counts; not known: no stop yet.
+    bool setpoint_current;                  ///< The configuration requires a current, which a twist does not have.
+    char contradicted[ROS_SENTENCE_SIZE];   ///< Contradicted assumptions, with the fix; empty: none.
+    unsigned assumed;                       ///< Assumptions that nothing has verified yet.
+    size_t assumptions_length;              ///< 0: the next assumptions are read in any case.
+    char assumptions[ROS_ASSUMPTIONS_SIZE]; ///< Text of the assumptions that were read last.
+    char stop[ROS_SENTENCE_SIZE];           ///< Sentence of the last stop.
+    iwc_value_t stop_number;                ///< Number of the last stop, as the gateway counts; not known: no stop yet.
 } ros_machine_t;
 
 typedef struct {
@@ -108,8 +112,8 @@ void ros_facts_read_config(const iwc_message_t *reply, ros_machine_t *machine);
 /// Returns true if the assumptions of this snapshot have no values, so that the caller must request `config`.
 bool ros_facts_lack_values(const iwc_message_t *snapshot);
 
-/// Reads measures and contradictions from the assumptions of a snapshot. Slower than `ros_facts_read`, and the contents
-/// seldom change.
+/// Reads measures and contradictions from the assumptions of a snapshot. This is slower than `ros_facts_read`, so the
+/// function compares the text first: if it and the configured values are those of the last call, nothing changes.
 void ros_facts_read_assumptions(const iwc_message_t *message, ros_machine_t *machine);
 
 #endif

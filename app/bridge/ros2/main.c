@@ -15,19 +15,19 @@ static void loop(bridge_t *bridge) {
     bridge_service_t service;
     int wait_ms = 0;
     bridge_service_open(&service);
-    bridge_service_tell(&service, "READY=1");
+    bridge_service_notify(&service, "READY=1");
     do {
         bridge_step(bridge);
         bridge_service_round(&service, bridge_now_us());
         entries[1] = (struct pollfd){.events = POLLIN};
         wait_ms = bridge_wait_ms(bridge, &entries[1].fd);
     } while (bridge_service_wait(entries, 2, wait_ms));
-    bridge_service_tell(&service, "STOPPING=1");
+    bridge_service_notify(&service, "STOPPING=1");
 }
 
 /// Reports that the bridge listens to a network. If the unit does not permit that, other machines receive nothing,
 /// without an error.
-static void tell_reach(const ros_settings_t *settings) {
+static void report_reach(const ros_settings_t *settings) {
     char text[BRIDGE_REACH_TEXT];
     if (!settings->ros.loopback) {
         (void)fprintf(
@@ -48,7 +48,7 @@ static int run(const ros_settings_t *settings) {
     }
     const int result = bridge_open(bridge, settings);
     if (result == 0) {
-        tell_reach(settings);
+        report_reach(settings);
         loop(bridge);
         bridge_close(bridge);
     }

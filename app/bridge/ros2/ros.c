@@ -336,6 +336,28 @@ bool ros_take_command(ros_t *self, unsigned reader, ros_command_t *out_command) 
     return accepted;
 }
 
+static bool is_written_to(dds_entity_t reader) {
+    return reader > 0 && dds_get_matched_publications(reader, NULL, 0) > 0;
+}
+
+static bool is_read(dds_entity_t writer) {
+    return writer > 0 && dds_get_matched_subscriptions(writer, NULL, 0) > 0;
+}
+
+bool ros_is_used(const ros_t *self) {
+    bool used = is_written_to(self->asks);
+    for (unsigned i = 0; i < WRITERS && !used; i++) {
+        used = is_read(self->writers[i]);
+    }
+    for (unsigned i = 0; i < ROS_COMMAND_READERS && !used; i++) {
+        used = is_written_to(self->commands[i]);
+    }
+    for (unsigned i = 0; i < ROS_VERBS && !used; i++) {
+        used = is_written_to(self->requests[i]) || is_read(self->replies[i]);
+    }
+    return used;
+}
+
 unsigned ros_publishers(const ros_t *self) {
     unsigned sum = 0;
     for (unsigned i = 0; i < ROS_COMMAND_READERS; i++) {

@@ -49,8 +49,13 @@ bool ros_take_command(ros_t *self, unsigned reader, ros_command_t *out_command);
 /// Returns the number of publishers of cmd_vel from which the bridge receives.
 unsigned ros_publishers(const ros_t *self);
 
+/// Returns true if DDS has matched a node with a topic or a service of the bridge. Readers of the names of nodes do not
+/// count.
+bool ros_is_used(const ros_t *self);
+
 /// Finds the publishers of cmd_vel from which the bridge does not receive. The cost grows with the number of writers in
-/// the domain.
+/// the domain. `*out` has the result of the last call. It stays unchanged if it shows no such publisher, no program has
+/// announced a writer in the last 2 s, and the last search was less than 10 s ago.
 void ros_find_unmatched(ros_t *self, ros_unmatched_t *out);
 
 typedef struct {
@@ -75,7 +80,7 @@ void ros_publish_motion(ros_t *self, const ros_machine_t *machine, const ros_odo
 void ros_publish_wrench(ros_t *self, const ros_machine_t *machine);
 void ros_publish_battery(ros_t *self, const ros_machine_t *machine);
 
-/// Publishes `statuses`, which has ROS_TELLS entries, with the name of the node before each name. `wall_us` is the
+/// Publishes `statuses`, which has ROS_REPORTS entries, with the name of the node before each name. `wall_us` is the
 /// present time.
 void ros_publish_diagnostics(ros_t *self, const ros_status_t *statuses, int64_t wall_us);
 void ros_publish_state(ros_t *self, const char *json);

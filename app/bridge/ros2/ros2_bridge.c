@@ -163,7 +163,7 @@ static void show_estop(bridge_t *self) {
 
 static void publish_facts(bridge_t *self, int64_t now) {
     char state[sizeof self->state];
-    ros_status_t statuses[ROS_TELLS];
+    ros_status_t statuses[ROS_REPORTS];
     ros_state_json(&self->facts, state, sizeof state);
     const bool changed = strcmp(state, self->state) != 0;
     if (!changed && now < self->second_us) {
@@ -180,8 +180,8 @@ static void publish_facts(bridge_t *self, int64_t now) {
     }
     self->facts.commands.publishers = ros_publishers(self->ros);
     self->facts.commands.coming = self->coming_us > 0 && now - self->coming_us < SECOND_US;
-    for (unsigned i = 0; i < ROS_TELLS; i++) {
-        ros_diagnose(&self->facts, (ros_tells_t)i, &statuses[i]);
+    for (unsigned i = 0; i < ROS_REPORTS; i++) {
+        ros_diagnose(&self->facts, (ros_report_t)i, &statuses[i]);
     }
     ros_publish_diagnostics(self->ros, statuses, bridge_wall_us());
     if (now >= self->second_us) {
@@ -203,6 +203,7 @@ void bridge_step(bridge_t *self) {
     }
     const int64_t now = bridge_monotonic_us();
     judge_silence(self, now);
+    bridge_choose_rate(self, now);
     if (self->facts.link == ROS_LINK_UP && now - self->received_us > SILENT_US) {
         self->facts.link = ROS_LINK_SILENT;
     }

@@ -35,7 +35,7 @@ typedef struct {
     uint64_t driver;      ///< The first publisher that drove since the grant; 0: none has driven.
     bool assumptions_due; ///< Read the assumptions from the next snapshot, in every state of the link.
     bool silenced;        ///< The bridge requested a stop because the source fell silent; the event is outstanding.
-    bool told_gone;       ///< The log has the warning. A gateway that accepts and fails again is one absence.
+    bool gone_reported;   ///< The log has the warning. A gateway that accepts and fails again is one absence.
     int64_t received_us;  ///< Reception of the last snapshot.
     int64_t commanded_us; ///< Time at which the last command was forwarded; 0: none since arming.
     int64_t coming_us;    ///< Reception of the last command, forwarded or not; 0: none.
@@ -43,6 +43,10 @@ typedef struct {
     ros_estop_t estop;    ///< State that iwheel/emergency_stop shows.
     iwc_value_t shown;    ///< Number of the stop that iwheel/state shows.
     int64_t shown_us;     ///< Time since which iwheel/state shows it.
+    unsigned rate_hz;     ///< Requested rate of the snapshots; 0: refused.
+    int64_t rate_id;      ///< Id of the request for another rate; 0: none.
+    int64_t used_us;      ///< Time at which DDS last had a node matched with the bridge, or of the connection.
+    int64_t used_next_us; ///< Time of the next such check.
     int64_t retry_us;     ///< Time of the next attempt to connect.
     int64_t backoff_us;   ///< Interval to the attempt after that.
     int64_t second_us;    ///< Time at which the reports once per second are due.

@@ -61,7 +61,8 @@ struct ros {
     dds_entity_t replies[ROS_VERBS];
     ros_reply_t waiting[ROS_WAITING]; ///< The oldest first.
     dds_entity_t graph;
-    int fd; ///< An eventfd, readable when DDS has a sample.
+    int64_t searched_us; ///< Time of the last search for publishers that do not match; 0: none yet.
+    int fd;              ///< An eventfd, readable when DDS has a sample.
     ros_came_t came;
     void *context;                   ///< Argument of `came`.
     char robot[ROS_ROBOT_SIZE];      ///< Namespace and node, which distinguish two machines in /diagnostics.
@@ -88,6 +89,10 @@ bool ros_open_service(ros_t *self, ros_verb_t verb);
 
 /// Writes each waiting reply whose caller can read it now, or whose time is over.
 void ros_send_replies(ros_t *self);
+
+/// Returns the time, by bridge_now_us, when a program last announced a writer or the end of one; 0: never. DDS may not
+/// have processed the announcement yet.
+int64_t ros_announced_us(void);
 
 /// Stops marking messages that leave the process as replies.
 void ros_close_services(ros_t *self);

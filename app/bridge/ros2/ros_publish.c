@@ -149,10 +149,10 @@ void ros_publish_battery(ros_t *self, const ros_machine_t *machine) {
 }
 
 void ros_publish_diagnostics(ros_t *self, const ros_status_t *statuses, int64_t wall_us) {
-    diagnostic_msgs_msg_dds__KeyValue_ values[ROS_TELLS][ROS_VALUES_MAX];
-    diagnostic_msgs_msg_dds__DiagnosticStatus_ all[ROS_TELLS];
-    char names[ROS_TELLS][ROS_ROBOT_SIZE + 24U];
-    for (size_t i = 0; i < ROS_TELLS; i++) {
+    diagnostic_msgs_msg_dds__KeyValue_ values[ROS_REPORTS][ROS_VALUES_MAX];
+    diagnostic_msgs_msg_dds__DiagnosticStatus_ all[ROS_REPORTS];
+    char names[ROS_REPORTS][ROS_ROBOT_SIZE + 24U];
+    for (size_t i = 0; i < ROS_REPORTS; i++) {
         const ros_status_t *status = &statuses[i];
         for (size_t j = 0; j < status->value_count; j++) {
             values[i][j] = (diagnostic_msgs_msg_dds__KeyValue_){.key = writable(status->values[j].key),
@@ -167,7 +167,7 @@ void ros_publish_diagnostics(ros_t *self, const ros_status_t *statuses, int64_t 
             .values = {._length = status->value_count, ._buffer = values[i]}};
     }
     const diagnostic_msgs_msg_dds__DiagnosticArray_ array = {.header = header(wall_us, nothing),
-                                                             .status = {._length = ROS_TELLS, ._buffer = all}};
+                                                             .status = {._length = ROS_REPORTS, ._buffer = all}};
     (void)dds_write(self->writers[WRITES_DIAGNOSTICS], &array);
 }
 

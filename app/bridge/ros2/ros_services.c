@@ -92,6 +92,7 @@ ssize_t sendmsg(int fd, const struct msghdr *message, int flags) {
 static struct {
     pthread_mutex_t lock;
     rtps_firsts_t firsts;
+    int64_t announced_us; ///< See `ros_announced_us`.
 } in = {.lock = PTHREAD_MUTEX_INITIALIZER};
 
 /// Replaces libc's function for the whole process. It makes CycloneDDS request the samples that a new writer of Fast
@@ -102,12 +103,20 @@ ssize_t recvmsg(int fd, struct msghdr *message, int flags) {
         return came;
     }
     const struct iovec *buffer = &message->msg_iov[0];
-    rtps_drop_large_data(buffer->iov_base, (size_t)came);
+    const bool has_writer = rtps_drop_large_data(buffer->iov_base, (size_t)came);
     (void)pthread_mutex_lock(&in.lock);
-    const size_t length =
-        rtps_await_firsts(&in.firsts, (int64_t)bridge_now_us(), buffer->iov_base, (size_t)came, buffer->iov_len);
+    const int64_t now = (int64_t)bridge_now_us();
+    const size_t length = rtps_await_firsts(&in.firsts, now, buffer->iov_base, (size_t)came, buffer->iov_len);
+    in.announced_us = has_writer ? now : in.announced_us;
     (void)pthread_mutex_unlock(&in.lock);
     return (ssize_t)length;
+}
+
+int64_t ros_announced_us(void) {
+    (void)pthread_mutex_lock(&in.lock);
+    const int64_t at_us = in.announced_us;
+    (void)pthread_mutex_unlock(&in.lock);
+    return at_us;
 }
 
 static void note_reply(ros_verb_t verb, const ros_caller_t *caller) {

@@ -1,12 +1,17 @@
 // SPDX-License-Identifier: MIT
 // Finds publishers of cmd_vel that DDS does not connect to the bridge. ROS connects only equal types and compatible
 // QoS, and reports no error.
+#include "common/bridge_service.h"
 #include "ros_parts.h"
 #include "ros_types.h"
 
 #include <string.h>
 
 #define BATCH 16U
+/// Time in which DDS processes an announcement, on a busy machine too.
+#define SETTLED_US 2000000
+/// A search without an announcement, in case one came in a form that the bridge does not detect.
+#define AGAIN_US 10000000
 
 typedef struct {
     ros_t *self;
@@ -78,12 +83,23 @@ static void judge_writer(search_t *search, const dds_builtintopic_endpoint_t *wr
     ros_facts_type_name(writer->type_name, out->type, sizeof out->type);
 }
 
+/// Returns true if a search can have another result than the last one.
+static bool is_search_due(const ros_t *self, const ros_unmatched_t *last, int64_t now) {
+    return self->searched_us == 0 || last->count > 0U || last->elsewhere[0] != '\0' ||
+           now - ros_announced_us() < SETTLED_US || now - self->searched_us >= AGAIN_US;
+}
+
 void ros_find_unmatched(ros_t *self, ros_unmatched_t *out) {
     static const char *const wanted[] = {"nothing", "geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped",
                                          "geometry_msgs/msg/Twist or TwistStamped"};
     search_t search = {.self = self, .out = out};
     void *samples[BATCH] = {NULL};
     dds_sample_info_t infos[BATCH];
+    const int64_t now = (int64_t)bridge_now_us();
+    if (!is_search_due(self, out, now)) {
+        return;
+    }
+    self->searched_us = now;
     *out = (ros_unmatched_t){.policy = "", .wanted = wanted[self->settings.drive.command & ROS_COMMAND_BOTH]};
     if (!self->settings.drive.enabled) {
         return;

@@ -7,7 +7,7 @@
 #include <stdio.h>
 #include <string.h>
 
-static relay_channel_t *channel_of(relay_t *self, const sock_client_t *client) {
+relay_channel_t *relay_channel_of(relay_t *self, const sock_client_t *client) {
     for (unsigned i = 1; i <= IWN_LINE_CHANNELS; i++) {
         if (self->channel[i].client == client->id) {
             return &self->channel[i];
@@ -24,16 +24,28 @@ static void release(relay_channel_t *channel) {
     channel->queue.count = 0;
 }
 
-/// Returns the free channel that was unused for longest, so that replies on the way reach no other client.
+/// Returns the channel without a client that was unused for longest, so that replies on the way reach no other client.
 static relay_channel_t *free_channel(relay_t *self) {
     relay_channel_t *found = NULL;
     for (unsigned i = 1; i <= IWN_LINE_CHANNELS; i++) {
         relay_channel_t *channel = &self->channel[i];
-        if (channel->state == RELAY_FREE && (found == NULL || channel->used_us < found->used_us)) {
+        if (channel->client == IW_CLIENT_NONE && (found == NULL || channel->used_us < found->used_us)) {
             found = channel;
         }
     }
     return found;
+}
+
+void relay_refuse(relay_t *self, sock_client_t *client, const iwn_id_t *id, iwn_error_t error, const char *reason) {
+    iwn_refusal_t refusal;
+    (void)IWN_REFUSE(&refusal, error, reason);
+    sock_clients_refuse(&self->clients, client, id, &refusal);
+}
+
+/// Closes the client. Its stops among the bytes that were not read are executed.
+static void let_go(relay_t *self, sock_client_t *client) {
+    sock_client_read(client);
+    sock_service_finish(&self->clients, client);
 }
 
 static void turn_away(relay_t *self, sock_client_t *client, const char *why) {
@@ -41,7 +53,7 @@ static void turn_away(relay_t *self, sock_client_t *client, const char *why) {
     iwn_refusal_t refusal;
     (void)IWN_REFUSE(&refusal, IWN_BUS_DOWN, "no board on the serial line: ", why);
     sock_clients_refuse(&self->clients, client, &(iwn_id_t){.kind = IWN_ID_NONE}, &refusal);
-    sock_client_finish(client, self->now_us);
+    let_go(self, client);
 }
 
 /// Returns the time after which the answer to a `drive` is lost: a line of the largest size may precede it.
@@ -49,31 +61,37 @@ static uint64_t hold_us(const relay_t *self) {
     return 30000U + (uint64_t)4608U * 10U * 1000000U / self->settings->board.baud;
 }
 
+static void begin(const relay_t *self, relay_channel_t *channel, iw_client_t client, bool watch) {
+    *channel = (relay_channel_t){.state = RELAY_NEW,
+                                 .client = client,
+                                 .watch = watch,
+                                 .close_due = channel->close_due,
+                                 .served = channel->served,
+                                 .since_us = self->now_us,
+                                 .used_us = self->now_us};
+    serial_queue_init(&channel->queue, hold_us(self));
+}
+
 static void welcome(void *context, sock_client_t *client) {
     relay_t *self = (relay_t *)context;
     if (client->right == SOCK_STOP) {
-        return; // A guest: guests.c executes its one line.
+        return; // It has no channel.
     }
     relay_channel_t *channel = free_channel(self);
     if (self->link.state == SERIAL_SILENT || channel == NULL) {
         turn_away(self, client, (self->trouble[0] != '\0') ? self->trouble : "it has not answered yet; try again");
         return;
     }
-    *channel = (relay_channel_t){.state = RELAY_NEW,
-                                 .client = client->id,
-                                 .watch = client->right == SOCK_WATCH,
-                                 .close_due = channel->close_due,
-                                 .since_us = self->now_us,
-                                 .used_us = self->now_us};
-    serial_queue_init(&channel->queue, hold_us(self));
+    begin(self, channel, client->id, client->right == SOCK_WATCH);
 }
 
 /// Called once or more often: a client that is gone holds no lease. A client that only reads still receives its
 /// replies.
 static void leave(void *context, sock_client_t *client) {
-    relay_channel_t *channel = channel_of((relay_t *)context, client);
+    relay_channel_t *channel = relay_channel_of((relay_t *)context, client);
     if (channel != NULL && channel->granted) {
         release(channel);
+        client->owed = false; // Its queue is gone.
     }
 }
 
@@ -104,6 +122,9 @@ static size_t write_quoted(relay_t *self, const serial_request_t *request, size_
 static const char *too_late(const relay_t *self, const relay_channel_t *channel, serial_kind_t kind, uint64_t came_us) {
     if (kind != SERIAL_MOVES && kind != SERIAL_GRANTS) {
         return NULL;
+    }
+    if (channel->ahead > 0U) {
+        return "a stop of this client came before this request was sent to the board; send it again";
     }
     if (came_us < self->gap_us) {
         return "the relay was delayed while this request waited, so it was not sent; send it again";
@@ -145,18 +166,25 @@ static void forward(relay_t *self, relay_channel_t *channel, const iwn_request_t
 
 static void carry_out(void *context, sock_client_t *client, const char *line, size_t length) {
     relay_t *self = (relay_t *)context;
-    if (client->right == SOCK_STOP) {
-        relay_guest_carry_out(self, client, line, length);
-        return;
-    }
-    relay_channel_t *channel = channel_of(self, client);
+    relay_channel_t *channel = relay_channel_of(self, client);
+    const bool last = channel == NULL || sock_client_is_closing(client);
     iwn_request_t request;
     iwn_refusal_t refusal;
-    if (channel == NULL || sock_client_is_closing(client)) {
+    const bool right = iwn_request_read(line, length, &self->work, &request, &refusal);
+    const bool stops = right && iwn_cmd_stops(request.cmd);
+    if (last && stops) {
+        relay_stop_last(self, client, &request);
+    } else if (last && client->right == SOCK_STOP) {
+        sock_service_refuse_crowd(&self->clients, client, &refusal);
+        sock_clients_refuse(&self->clients, client, &request.id, &refusal);
+    }
+    if (last) {
         return;
     }
-    if (!iwn_request_read(line, length, &self->work, &request, &refusal)) {
+    if (!right) {
         answer_here(channel, &request.id, refusal.error, refusal.message);
+    } else if (stops) {
+        relay_stop_forward(self, channel, client, &request);
     } else if (channel->watch && !iwn_cmd_watches(request.cmd)) {
         answer_here(
             channel, &request.id, IWN_DENIED,
@@ -173,13 +201,8 @@ sock_handler_t relay_handler(relay_t *self) {
     return (sock_handler_t){.welcome = welcome, .carry_out = carry_out, .leave = leave, .context = self};
 }
 
-/// Passes a reply: `rest` is the part after `ok` in the board's reply, and the client receives it with its own id.
-static void pass_reply(relay_t *self, sock_client_t *owner, const serial_request_t *request, const char *rest,
-                       size_t length) {
-    sock_client_t *client = relay_guest_or(self, owner, request);
-    if (client == NULL) {
-        return;
-    }
+void relay_pass_reply(relay_t *self, sock_client_t *client, const serial_request_t *request, const char *rest,
+                      size_t length) {
     iwn_out_t json = iwn_write_reply(self->clients.line, sizeof self->clients.line, &request->id, request->ok);
     if (length + 1U < json.size - json.length) {
         memcpy(&json.data[json.length], rest, length);
@@ -188,18 +211,13 @@ static void pass_reply(relay_t *self, sock_client_t *owner, const serial_request
     }
 }
 
-static void tell_answered(relay_t *self, relay_channel_t *channel, sock_client_t *client) {
+static void report_answered(relay_t *self, relay_channel_t *channel, sock_client_t *client) {
     const serial_request_t *request;
     while ((request = serial_queue_answered(&channel->queue)) != NULL) {
         if (request->state == SERIAL_HELD) {
-            pass_reply(self, client, request, request->json, request->length);
+            relay_pass_reply(self, client, request, request->json, request->length);
         } else {
-            iwn_refusal_t refusal;
-            sock_client_t *who = relay_guest_or(self, client, request);
-            (void)IWN_REFUSE(&refusal, request->error, request->reason);
-            if (who != NULL) {
-                sock_clients_refuse(&self->clients, who, &request->id, &refusal);
-            }
+            relay_refuse(self, client, &request->id, request->error, request->reason);
         }
         serial_queue_drop(&channel->queue);
     }
@@ -227,24 +245,38 @@ static bool read_reply(const char **at, const char *end, uint64_t *out_number, b
     return *out_ok || skip(at, end, ",\"ok\":false");
 }
 
-static void take_reply(relay_t *self, relay_channel_t *channel, sock_client_t *client, const iwn_line_t *line) {
+/// Passes the reply to this client if it waits for it. Equal stops of a client have one number.
+static bool give(relay_t *self, relay_channel_t *channel, sock_client_t *client, const relay_reply_t *reply) {
+    bool given = false;
+    while (serial_queue_take(&channel->queue, reply->number, reply->ok, reply->rest, reply->length)) {
+        const serial_request_t *oldest = &channel->queue.ring[channel->queue.first];
+        given = true;
+        if (reply->number == channel->arm_number) {
+            channel->armed_us = self->now_us;
+        }
+        if (oldest->number == reply->number && oldest->state == SERIAL_SENT) {
+            relay_pass_reply(self, client, oldest, reply->rest, reply->length);
+            serial_queue_drop(&channel->queue);
+        }
+    }
+    report_answered(self, channel, client);
+    return given;
+}
+
+/// A stop may have used the channel of another client.
+static void take_reply(relay_t *self, const iwn_line_t *line) {
     const char *end = &line->json[line->length];
-    const char *at = line->json;
-    const serial_request_t *oldest = &channel->queue.ring[channel->queue.first];
-    uint64_t number;
-    bool ok;
-    if (!read_reply(&at, end, &number, &ok) ||
-        !serial_queue_take(&channel->queue, number, ok, at, (size_t)(end - at))) {
-        return; // The request timed out, and its client was informed.
+    relay_reply_t reply = {.rest = line->json};
+    bool given = false;
+    if (!read_reply(&reply.rest, end, &reply.number, &reply.ok)) {
+        return;
     }
-    if (number == channel->arm_number) {
-        channel->armed_us = self->now_us;
+    reply.length = (size_t)(end - reply.rest);
+    for (unsigned i = 1; i <= IWN_LINE_CHANNELS; i++) {
+        sock_client_t *client = sock_clients_find(&self->clients, self->channel[i].client);
+        given = (client != NULL && give(self, &self->channel[i], client, &reply)) || given;
     }
-    if (oldest->number == number) {
-        pass_reply(self, client, oldest, at, (size_t)(end - at));
-        serial_queue_drop(&channel->queue);
-    }
-    tell_answered(self, channel, client);
+    relay_stop_take(self, &reply, given);
 }
 
 static bool begins(const iwn_line_t *line, const char *words) {
@@ -256,20 +288,23 @@ void relay_take_line(relay_t *self, const iwn_line_t *line) {
     relay_channel_t *channel = &self->channel[line->channel];
     sock_client_t *client = sock_clients_find(&self->clients, channel->client);
     const bool hello = begins(line, "{\"event\":\"hello\"");
-    if (client == NULL || (channel->state != RELAY_WELCOMED && !hello) ||
-        line->length + 1U > sizeof self->clients.line) {
-        return; // The event is for the former client of this channel.
-    }
     if (begins(line, "{\"id\":")) {
-        take_reply(self, channel, client, line);
+        take_reply(self, line);
         return;
     }
+    if (channel->state < (hello ? RELAY_OPENING : RELAY_WELCOMED) || line->length + 1U > sizeof self->clients.line) {
+        return; // The event is for the former client of this channel.
+    }
+    const bool first = hello && channel->state != RELAY_WELCOMED;
     memcpy(self->clients.line, line->json, line->length);
     self->clients.line[line->length] = '\n';
-    if (hello && channel->state != RELAY_WELCOMED) {
+    if (first) {
         channel->state = RELAY_WELCOMED;
+        channel->served = true;
+    }
+    if (first && client != NULL) {
         sock_client_reply(client, self->clients.line, line->length + 1U);
-    } else if (!hello) {
+    } else if (!hello && client != NULL) {
         sock_client_event(client, self->clients.line, line->length + 1U);
     }
 }
@@ -277,14 +312,18 @@ void relay_take_line(relay_t *self, const iwn_line_t *line) {
 static void drop_client(relay_t *self, relay_channel_t *channel) {
     sock_client_t *client = sock_clients_find(&self->clients, channel->client);
     release(channel);
+    channel->served = false;
     if (client != NULL) {
-        sock_client_finish(client, self->now_us);
+        let_go(self, client);
     }
 }
 
 void relay_drop_clients(relay_t *self) {
     for (unsigned i = 1; i <= IWN_LINE_CHANNELS; i++) {
         drop_client(self, &self->channel[i]);
+    }
+    if (self->link.state == SERIAL_SILENT) {
+        relay_stops_refuse(self);
     }
     if (self->out_sent == 0U) {
         self->out_length = 0; // An incomplete line is ended, or the next one would be lost too.
@@ -293,6 +332,9 @@ void relay_drop_clients(relay_t *self) {
 
 static void poll_channel(relay_t *self, relay_channel_t *channel) {
     sock_client_t *client = sock_clients_find(&self->clients, channel->client);
+    if (channel->client == IW_CLIENT_NONE && relay_stops_wait(self, self->now_us)) {
+        return;
+    }
     if (client == NULL || sock_client_is_closing(client) || sock_client_is_broken(client)) {
         release(channel);
         return;
@@ -302,13 +344,14 @@ static void poll_channel(relay_t *self, relay_channel_t *channel) {
         turn_away(self, client, "the board does not answer to a new client; is its image `gateway`, and not too old?");
         return;
     }
+    relay_stops_read_ahead(self, channel, client);
     serial_queue_age(&channel->queue, self->now_us);
     if (channel->queue.unanswered >= RELAY_UNANSWERED) {
         release(channel);
         turn_away(self, client, "the board replied to none of the last requests; connect again");
         return;
     }
-    tell_answered(self, channel, client);
+    report_answered(self, channel, client);
     client->owed = channel->queue.count > 0U; // A client that has ended stays for its replies.
     if (client->held && !serial_queue_is_full(&channel->queue)) {
         client->held = false;
@@ -316,16 +359,33 @@ static void poll_channel(relay_t *self, relay_channel_t *channel) {
     }
 }
 
+/// Opens a channel without a client if stops wait and the board serves none, or does not answer.
+static void open_for_stops(relay_t *self) {
+    const bool doubt = relay_stops_wait(self, self->now_us - RELAY_DOUBT_US);
+    bool wanted = relay_stops_wait(self, self->now_us);
+    for (unsigned i = 1; i <= IWN_LINE_CHANNELS; i++) {
+        const relay_channel_t *channel = &self->channel[i];
+        const bool opens = channel->state != RELAY_FREE;
+        wanted = wanted && (doubt || (!channel->served && !opens)) && !(opens && channel->client == IW_CLIENT_NONE);
+    }
+    relay_channel_t *channel = free_channel(self);
+    if (wanted && channel != NULL && self->link.state == SERIAL_LINKED) {
+        begin(self, channel, IW_CLIENT_NONE, true);
+    }
+}
+
 void relay_poll_channels(relay_t *self) {
+    relay_stops_age(self);
     for (unsigned i = 1; i <= IWN_LINE_CHANNELS; i++) {
         if (self->channel[i].state != RELAY_FREE) {
             poll_channel(self, &self->channel[i]);
         }
     }
+    open_for_stops(self);
 }
 
 uint64_t relay_channels_next_us(const relay_t *self) {
-    uint64_t next_us = UINT64_MAX;
+    uint64_t next_us = relay_stops_next_us(self);
     for (unsigned i = 1; i <= IWN_LINE_CHANNELS; i++) {
         const relay_channel_t *channel = &self->channel[i];
         const uint64_t then_us =
@@ -335,72 +395,4 @@ uint64_t relay_channels_next_us(const relay_t *self) {
         }
     }
     return next_us;
-}
-
-static size_t write_line(uint8_t channel, const char *json, size_t length, char *out, size_t size) {
-    return iwn_line_write(&(iwn_line_t){.channel = channel, .json = json, .length = length}, out, size);
-}
-
-/// Opening and closing of channels precede everything else.
-static size_t next_open_or_close(relay_t *self, char *out, size_t size) {
-    char json[64];
-    for (unsigned i = 1; i <= IWN_LINE_CHANNELS; i++) {
-        relay_channel_t *channel = &self->channel[i];
-        const bool again = channel->state == RELAY_OPENING && self->now_us >= channel->opened_us + RELAY_OPEN_US;
-        if (!channel->close_due && channel->state != RELAY_NEW && !again) {
-            continue;
-        }
-        if (channel->close_due) {
-            channel->close_due = false;
-            (void)snprintf(json, sizeof json, "{\"cmd\":\"close\",\"channel\":%u}", i);
-        } else {
-            channel->state = RELAY_OPENING;
-            channel->opened_us = self->now_us;
-            (void)snprintf(json, sizeof json, "{\"cmd\":\"open\",\"channel\":%u,\"watch\":%s}", i,
-                           channel->watch ? "true" : "false");
-        }
-        return write_line(0, json, strlen(json), out, size);
-    }
-    return 0;
-}
-
-static size_t next_request(relay_t *self, bool stops_only, char *out, size_t size) {
-    for (unsigned i = 0; i < IWN_LINE_CHANNELS; i++) {
-        const unsigned number = 1U + (self->next_channel + i) % IWN_LINE_CHANNELS;
-        relay_channel_t *channel = &self->channel[number];
-        serial_request_t *request =
-            (channel->state == RELAY_WELCOMED) ? serial_queue_next(&channel->queue, stops_only, self->now_us) : NULL;
-        if (request != NULL) {
-            self->next_channel = number % IWN_LINE_CHANNELS;
-            serial_queue_sent(request, self->now_us);
-            return write_line((uint8_t)number, request->json, request->length, out, size);
-        }
-    }
-    return 0;
-}
-
-static size_t next_sign_of_life(relay_t *self, char *out, size_t size) {
-    static const char alive[] = "{\"cmd\":\"alive\"}";
-    if (self->link.state == SERIAL_SILENT && self->now_us >= self->asked_us + RELAY_ASK_US) {
-        self->asked_us = self->now_us;
-        return write_line(0, RELAY_ASK, sizeof RELAY_ASK - 1U, out, size);
-    }
-    return (self->link.state == SERIAL_LINKED && sock_clients_count(&self->clients) > 0U &&
-            self->now_us >= self->said_us + RELAY_ALIVE_US)
-               ? write_line(0, alive, sizeof alive - 1U, out, size)
-               : 0U;
-}
-
-size_t relay_next_line(relay_t *self, char *out, size_t size) {
-    size_t length = 0;
-    if (self->link.state == SERIAL_LINKED) {
-        length = next_open_or_close(self, out, size);
-        if (length == 0U) {
-            length = next_request(self, true, out, size);
-        }
-    }
-    if (length == 0U) {
-        length = next_sign_of_life(self, out, size);
-    }
-    return (length > 0U || self->link.state == SERIAL_SILENT) ? length : next_request(self, false, out, size);
 }

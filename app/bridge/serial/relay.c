@@ -42,8 +42,8 @@ static void set_trouble(relay_t *self, const char *words) {
 /// Closes the port and opens it again later, with a longer delay each time until a board answers.
 static void lose_port(relay_t *self, const char *words) {
     serial_port_close(&self->port); // This also removes it from the epoll set.
-    relay_drop_clients(self);
     serial_link_init(&self->link, self->now_us);
+    relay_drop_clients(self);
     self->out_length = 0;
     self->out_sent = 0;
     self->retry_us = self->now_us + self->backoff_us;
@@ -170,7 +170,7 @@ static void write_port(relay_t *self) {
         const uint64_t begin_us = (self->free_us > self->now_us) ? self->free_us : self->now_us;
         if (count > 0) {
             self->free_us = begin_us + (uint64_t)count * 10000000U / self->settings->board.baud;
-            self->said_us = self->now_us;
+            self->written_us = self->now_us;
         }
         self->out_sent += (size_t)count;
         if (self->out_sent < self->out_length) {
@@ -187,7 +187,7 @@ static void write_port(relay_t *self) {
 static void poll_port(relay_t *self) {
     if (self->port.fd < 0 && self->now_us >= self->retry_us) {
         (void)open_port(self);
-    } else if (self->port.fd >= 0 && self->out_length > 0U && self->now_us >= self->said_us + RELAY_STUCK_US &&
+    } else if (self->port.fd >= 0 && self->out_length > 0U && self->now_us >= self->written_us + RELAY_STUCK_US &&
                self->now_us >= self->free_us + RELAY_STUCK_US) {
         serial_port_discard(&self->port);
         lose_port(self, "the port accepts no data any more: does the board hang, or block the line?");
@@ -224,7 +224,7 @@ static uint64_t earlier(uint64_t a_us, uint64_t b_us) {
 
 /// Returns the time of the next action without input.
 static uint64_t next_us(const relay_t *self) {
-    const bool busy = sock_clients_count(&self->clients) > 0U;
+    const bool busy = sock_clients_count(&self->clients) > 0U || relay_stops_wait(self, self->now_us);
     uint64_t then_us = self->now_us + (busy ? RELAY_ALIVE_US / 2U : IDLE_US);
     then_us = earlier(then_us, sock_service_next_us(&self->clients));
     if (self->port.fd < 0) {
@@ -269,25 +269,21 @@ static bool note_event(relay_t *self, const struct epoll_event *event, bool *out
             lose_port(self, "the port has gone: was the cable pulled?");
         }
         return false;
-    default: {
-        sock_client_t *client = &self->clients.client[event->data.u64 - SOCK_TAG_CLIENT];
-        client->readable = (event->events & (EPOLLIN | EPOLLRDHUP)) != 0U;
-        client->leaving = client->leaving || (event->events & (EPOLLRDHUP | EPOLLHUP | EPOLLERR)) != 0U;
-        client->hung_up = (event->events & (EPOLLHUP | EPOLLERR)) != 0U;
+    default:
+        sock_service_note(&self->clients, event);
         return false;
-    }
     }
 }
 
 /// Reads the clients before the board, so that a command never quotes a stamp that arrived while it waited.
-static void cycle(relay_t *self, bool somebody_knocks) {
+static void cycle(relay_t *self, bool client_waits) {
     sock_service_clients(&self->clients, IW_CLIENT_NONE);
     if (self->port.fd >= 0) {
         read_port(self);
     }
     poll_port(self);
     poll_link(self);
-    if (somebody_knocks) {
+    if (client_waits) {
         sock_service_accept(&self->clients);
     }
     relay_poll_channels(self);
@@ -298,7 +294,7 @@ static void cycle(relay_t *self, bool somebody_knocks) {
 
 static int loop(relay_t *self) {
     bool ends = false;
-    bridge_service_tell(&self->service, "READY=1");
+    bridge_service_notify(&self->service, "READY=1");
     while (!ends) {
         struct epoll_event events[EVENTS_PER_WAIT];
         const uint64_t then_us = sock_service_is_busy(&self->clients) ? 0U : next_us(self);
@@ -385,7 +381,7 @@ int relay_run(relay_t *self, const serial_settings_t *settings) {
         sock_log(&self->log, SOCK_LOG_INFO, "%s at %u bit/s, clients on %s", settings->board.port,
                  (unsigned)settings->board.baud, settings->northbound.socket);
         result = loop(self);
-        bridge_service_tell(&self->service, "STOPPING=1");
+        bridge_service_notify(&self->service, "STOPPING=1");
         relay_drop_clients(self);
         write_port(self); // As far as possible: the board also ends clients after silence.
         sock_service_close_all(&self->clients);

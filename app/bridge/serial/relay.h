@@ -10,6 +10,9 @@
 ///   lead to motion are refused. After RELAY_LEFT_US every client is closed, because the board has closed the channels.
 /// - A command is sent only if the line has space for it immediately (serial_queue.h).
 ///
+/// A stop is never refused, waits for no other request, and is not lost when its client disconnects: it has a place of
+/// its own until the board answers, and uses any channel that the board serves.
+///
 ///     port: CLOSED --opens--> ASKING (link, every RELAY_ASK_US) --event link--> LINKED: clients are served
 ///                ^------------- goes, or cannot be written to -----'
 #ifndef SERIAL_RELAY_H
@@ -41,20 +44,32 @@
 #define RELAY_UNANSWERED 3U
 /// A port that accepts nothing for this time is opened again.
 #define RELAY_STUCK_US 1000000U
+/// Number of stop requests in progress. If all of them wait, the next one is equal to one of them.
+#define RELAY_STOPS 32U
+/// Interval at which a stop without an answer is sent again, with the same number.
+#define SERIAL_AGAIN_US 150000U
+/// If a stop has no answer for this time, the board may have closed the channels.
+#define RELAY_DOUBT_US 300000U
+#define RELAY_NOT_SENT                                                                                                 \
+    "no board answers on the serial line: this stop was not delivered, or its reply was lost; press the e-stop"
 
 /// States of a channel:
 ///
 ///     FREE --a client--> NEW --open is sent--> OPENING --hello--> WELCOMED: requests are sent
 ///       ^------------ client or board gone, no hello -----------------'
+///
+/// If a stop waits and the board serves no channel, or does not answer, one is opened without a client.
 typedef enum { RELAY_FREE, RELAY_NEW, RELAY_OPENING, RELAY_WELCOMED } relay_channel_state_t;
 
 /// A client on the line.
 typedef struct {
     relay_channel_state_t state;
-    iw_client_t client; ///< IW_CLIENT_NONE in FREE.
+    iw_client_t client; ///< IW_CLIENT_NONE in FREE, and if it is open for stops only.
     bool watch;         ///< It is connected to the watch socket, in any state: its requests may only watch.
     bool close_due; ///< A close must be sent for the client before, in any state: the next client may already be there.
     bool granted;   ///< It has requested a lease, in any state: commands may follow.
+    bool served;    ///< The board serves it, in any state: a hello has come, and neither close nor open was sent since.
+    unsigned ahead; ///< Number of stops that were sent ahead: the first ones among the client's unread lines.
     uint64_t since_us;   ///< Time of its connection.
     uint64_t opened_us;  ///< Time of the last open.
     uint64_t arm_number; ///< Number of its last arm, ...
@@ -62,6 +77,23 @@ typedef struct {
     uint64_t used_us;    ///< Last use: the channel that was unused for longest is used next.
     serial_queue_t queue;
 } relay_channel_t;
+
+/// A reply of the board. `rest` is the part after `ok`.
+typedef struct {
+    uint64_t number;
+    bool ok;
+    const char *rest;
+    size_t length;
+} relay_reply_t;
+
+/// A stop request on its way to the board. WAITING: it was not sent. HELD: it is ahead and answered.
+typedef struct {
+    iw_client_t sender;       ///< Its client, which may be gone.
+    uint8_t channel;          ///< Channel of the sender when it came; 0: none.
+    bool latches;             ///< It is an estop.
+    bool ahead;               ///< Its line is still among the unread ones of its client, whose turn has not come.
+    serial_request_t request; ///< Number 0: the place is free.
+} relay_stop_t;
 
 typedef struct {
     const serial_settings_t *settings;
@@ -72,13 +104,14 @@ typedef struct {
     serial_port_t port;
     serial_link_t link;
     relay_channel_t channel[IWN_LINE_CHANNELS + 1U]; ///< Indexed by channel; 0 belongs to no client.
-    unsigned next_channel;                           ///< Channel that sends next.
-    uint64_t number;                                 ///< Number of the last request.
+    relay_stop_t stop[RELAY_STOPS];
+    unsigned next_channel; ///< Channel that sends next.
+    uint64_t number;       ///< Number of the last request.
     uint64_t now_us;
     uint64_t planned_us; ///< Planned end of the last wait.
     uint64_t gap_us;     ///< Requests sent before this time may have waited for the relay.
     uint64_t free_us;    ///< Time at which the line has sent all bytes.
-    uint64_t said_us;    ///< Time of the last line.
+    uint64_t written_us; ///< Time of the last line.
     uint64_t asked_us;   ///< Time of the last request for the link.
     uint64_t retry_us;   ///< Time of the next attempt to open the port.
     uint64_t backoff_us;
@@ -98,16 +131,14 @@ int relay_run(relay_t *self, const serial_settings_t *settings);
 
 sock_handler_t relay_handler(relay_t *self);
 
-/// Writes the request with this id instead of its own. Returns the length; 0 if it does not fit.
-size_t relay_write_numbered(iwn_json_t root, uint64_t number, char *out, size_t size);
+/// Returns the channel of this client; NULL if it has none.
+relay_channel_t *relay_channel_of(relay_t *self, const sock_client_t *client);
 
-/// Executes the one line of a client beyond the maximum (guests.c): a stop uses the channel of another client,
-/// everything else is refused.
-void relay_guest_carry_out(relay_t *self, sock_client_t *client, const char *line, size_t length);
+void relay_refuse(relay_t *self, sock_client_t *client, const iwn_id_t *id, iwn_error_t error, const char *reason);
 
-/// Returns the client that receives the reply to a request: the channel's client, or the guest that used the channel.
-/// NULL if that one is gone.
-sock_client_t *relay_guest_or(relay_t *self, sock_client_t *client, const serial_request_t *request);
+/// Passes a reply: `rest` is the part after `ok` in the board's reply, and the client receives it with its own id.
+void relay_pass_reply(relay_t *self, sock_client_t *client, const serial_request_t *request, const char *rest,
+                      size_t length);
 
 /// Handles a line of the board for a client.
 void relay_take_line(relay_t *self, const iwn_line_t *line);
@@ -121,5 +152,35 @@ uint64_t relay_channels_next_us(const relay_t *self);
 
 /// Writes the next line for the board to `out`. Returns its length; 0 if there is none.
 size_t relay_next_line(relay_t *self, char *out, size_t size);
+
+// ---- stops.c: stop requests ---------------------------------------------------------------------------------------
+
+/// Writes the request with this id instead of its own. Returns the length; 0 if it does not fit.
+size_t relay_write_numbered(iwn_json_t root, uint64_t number, char *out, size_t size);
+
+/// Sends a stop, which may have been sent ahead, and queues its reply.
+void relay_stop_forward(relay_t *self, relay_channel_t *channel, sock_client_t *client, const iwn_request_t *asked);
+
+/// Executes a stop of a client that has no queue, because it is beyond the maximum or is being closed.
+void relay_stop_last(relay_t *self, sock_client_t *client, const iwn_request_t *asked);
+
+/// Sends the stops among the lines whose turn has not come. Their replies stay in order.
+void relay_stops_read_ahead(relay_t *self, relay_channel_t *channel, sock_client_t *client);
+
+/// Records the board's answer to a stop, if it is one, and replies to a client without a channel. `passed`: its client
+/// has the reply, from its queue.
+void relay_stop_take(relay_t *self, const relay_reply_t *reply, bool passed);
+
+/// Handles a lost board: the clients are informed that their stops were not delivered.
+void relay_stops_refuse(relay_t *self);
+
+/// Handles the time limits of stops, and those whose clients have gone.
+void relay_stops_age(relay_t *self);
+uint64_t relay_stops_next_us(const relay_t *self);
+/// Returns true if a stop that came until then has no answer yet.
+bool relay_stops_wait(const relay_t *self, uint64_t since_us);
+
+/// Writes the stop that is sent now. Returns its length; 0 if there is none, or the board serves no channel yet.
+size_t relay_next_stop(relay_t *self, char *out, size_t size);
 
 #endif

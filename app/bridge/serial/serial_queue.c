@@ -41,18 +41,17 @@ static void refuse(serial_request_t *request, iwn_error_t error, const char *rea
     request->reason = reason;
 }
 
-/// Replaces waiting requests that could move the wheels, or that could later be mistaken for such a request.
-static void overtake(serial_queue_t *self, const serial_request_t *newer) {
+void serial_queue_overtake(serial_queue_t *self, serial_kind_t newer) {
     for (unsigned i = 0; i < self->count; i++) {
         serial_request_t *request = at(self, i);
         if (request->state != SERIAL_WAITING) {
             continue;
         }
-        if (request->kind == SERIAL_MOVES && newer->kind == SERIAL_MOVES) {
+        if (request->kind == SERIAL_MOVES && newer == SERIAL_MOVES) {
             refuse(request, IWN_STALE_COMMAND,
                    "a newer command of this client replaced this one before the serial line was free; send no faster "
                    "than the replies come");
-        } else if (newer->kind == SERIAL_STOPS && (request->kind == SERIAL_MOVES || request->kind == SERIAL_GRANTS)) {
+        } else if (newer == SERIAL_STOPS && (request->kind == SERIAL_MOVES || request->kind == SERIAL_GRANTS)) {
             refuse(request, IWN_STALE_COMMAND,
                    "a stop of this client came before this request was sent to the board; send it again");
         }
@@ -61,8 +60,8 @@ static void overtake(serial_queue_t *self, const serial_request_t *newer) {
 
 void serial_queue_put(serial_queue_t *self) {
     const serial_request_t *request = at(self, self->count);
-    if (request->state == SERIAL_WAITING) {
-        overtake(self, request);
+    if (request->state == SERIAL_WAITING || request->kind == SERIAL_STOPS) {
+        serial_queue_overtake(self, request->kind);
     }
     self->count++;
 }
@@ -88,8 +87,7 @@ static void give_up(serial_request_t *request) {
                "the board did not answer in time: this command or its reply was lost on the serial line; send a new "
                "command");
     } else {
-        refuse(request, IWN_INTERNAL,
-               "the board did not answer: this request or its reply was lost on the serial line; send it again");
+        refuse(request, IWN_INTERNAL, SERIAL_NO_REPLY);
     }
 }
 
@@ -106,9 +104,6 @@ void serial_queue_age(serial_queue_t *self, uint64_t now_us) {
 /// Returns the time at which a request changes its state without input.
 static uint64_t turn_us(const serial_queue_t *self, const serial_request_t *request, uint64_t now_us) {
     const uint64_t held_us = request->sent_us + self->hold_us;
-    if (request->state == SERIAL_SENT && request->kind == SERIAL_STOPS) {
-        return request->tried_us + SERIAL_AGAIN_US;
-    }
     if (request->state == SERIAL_SENT && request->kind == SERIAL_MOVES && held_us > now_us) {
         return held_us;
     }
@@ -126,34 +121,19 @@ uint64_t serial_queue_next_us(const serial_queue_t *self, uint64_t now_us) {
     return next_us;
 }
 
-/// Returns the requests after the last stop. Those before it end with the stop.
-static unsigned behind_stops(serial_queue_t *self) {
-    unsigned end = 0;
-    for (unsigned i = 0; i < self->count; i++) {
-        if (at(self, i)->kind == SERIAL_STOPS && at(self, i)->state == SERIAL_WAITING) {
-            end = i + 1U;
-        }
-    }
-    return end;
-}
-
 /// Returns true for a `drive` that has been on the line for this time.
 static bool holds_no_more(const serial_queue_t *self, const serial_request_t *request, uint64_t now_us) {
     return request->kind == SERIAL_MOVES && now_us >= request->sent_us + self->hold_us;
 }
 
-serial_request_t *serial_queue_next(serial_queue_t *self, bool stops_only, uint64_t now_us) {
-    const unsigned hurried = behind_stops(self);
+serial_request_t *serial_queue_next(serial_queue_t *self, uint64_t now_us) {
     bool unanswered = false;
-    for (unsigned i = 0; i < self->count; i++) {
+    for (unsigned i = 0; i < self->count && !unanswered; i++) {
         serial_request_t *request = at(self, i);
-        const bool again = request->state == SERIAL_SENT && request->kind == SERIAL_STOPS &&
-                           now_us >= request->tried_us + SERIAL_AGAIN_US;
-        const bool first = request->state == SERIAL_WAITING && (i < hurried || (!unanswered && !stops_only));
-        if (again || first) {
+        if (request->state == SERIAL_WAITING) {
             return request;
         }
-        unanswered = unanswered || (request->state == SERIAL_SENT && !holds_no_more(self, request, now_us));
+        unanswered = request->state == SERIAL_SENT && !holds_no_more(self, request, now_us);
     }
     return NULL;
 }
@@ -176,6 +156,17 @@ void serial_queue_drop(serial_queue_t *self) {
     self->count--;
 }
 
+/// Gives up commands before the request at this place. The board replies to a command at once, so the reply to a later
+/// request shows that theirs are lost, and each of them would use a place until then.
+static void give_up_before(serial_queue_t *self, unsigned index) {
+    for (unsigned i = 0; i < index; i++) {
+        serial_request_t *request = at(self, i);
+        if (request->state == SERIAL_SENT && request->kind == SERIAL_MOVES) {
+            give_up(request);
+        }
+    }
+}
+
 bool serial_queue_take(serial_queue_t *self, uint64_t number, bool ok, const char *rest, size_t length) {
     unsigned index = 0;
     while (index < self->count && (at(self, index)->number != number || at(self, index)->state != SERIAL_SENT)) {
@@ -187,13 +178,20 @@ bool serial_queue_take(serial_queue_t *self, uint64_t number, bool ok, const cha
     serial_request_t *request = at(self, index);
     self->unanswered = 0;
     request->ok = ok;
-    if (index > 0U && length <= sizeof request->json) {
+    give_up_before(self, index);
+    if (index > 0U) {
+        serial_request_hold(request, rest, length);
+    }
+    return true;
+}
+
+void serial_request_hold(serial_request_t *request, const char *rest, size_t length) {
+    if (length <= sizeof request->json) {
         request->state = SERIAL_HELD;
         request->length = length;
         memcpy(request->json, rest, length);
-    } else if (index > 0U) {
+    } else {
         refuse(request, IWN_INTERNAL,
                "the board replied out of order with more data than the relay stores; send the request again");
     }
-    return true;
 }

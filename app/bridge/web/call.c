@@ -120,7 +120,7 @@ static enum MHD_Result send_challenge(web_call_t *self) {
 /// Answers from the newest state: a viewer causes no request to the gateway.
 static enum MHD_Result send_status(web_call_t *self) {
     size_t length = 0;
-    self->server->link.looked_us = self->server->now_us;
+    self->server->link.polled_us = self->server->now_us;
     const char *text = web_link_status(&self->server->link, self->server->now_us, &length);
     return (text != NULL) ? send_text(self, text, length, MHD_RESPMEM_MUST_FREE)
                           : web_call_refuse(self, 503, "not_delivered", web_not_there);
@@ -160,7 +160,7 @@ static enum MHD_Result send_metrics(web_call_t *self) {
     own.dropped = self->server->driver.dropped;
     own.connections = self->server->link.gateway.connections;
     own.watchers = self->server->stream_count;
-    own.crowded_out = self->server->crowded_out + self->server->door.crowded_out;
+    own.crowded_out = self->server->crowded_out + self->server->backlog.crowded_out;
     FILE *out = open_memstream(&text, &length);
     if (out != NULL) {
         const bool known = web_link_state(&self->server->link, self->server->now_us, &state);
@@ -189,7 +189,7 @@ static enum MHD_Result send_fleet(web_call_t *self) {
     return (text != NULL)
                ? send_text(self, text, length, MHD_RESPMEM_MUST_FREE)
                : web_call_refuse(self, 404, "not_there",
-                                 "there are no rows of a fleet; set source under [fleet], and see that iwheel-fleet "
+                                 "there are no data of a fleet; set source under [fleet], and check that iwheel-fleet "
                                  "writes that file");
 }
 
@@ -202,7 +202,7 @@ static ssize_t read_stream(void *context, uint64_t position, char *out, size_t s
         return MHD_CONTENT_READER_END_OF_STREAM;
     }
     size_t length = web_reader_take(&self->reader, &server->link.feed, out, size);
-    if (length == 0U && server->now_us - self->told_us >= WEB_PULSE_US && size >= sizeof pulse) {
+    if (length == 0U && server->now_us - self->written_us >= WEB_PULSE_US && size >= sizeof pulse) {
         memcpy(out, pulse, sizeof pulse); // Shows both ends that the other end is online.
         length = sizeof pulse;
     }
@@ -210,7 +210,7 @@ static ssize_t read_stream(void *context, uint64_t position, char *out, size_t s
         web_call_suspend(self);
         return 0;
     }
-    self->told_us = server->now_us;
+    self->written_us = server->now_us;
     return (ssize_t)length;
 }
 

@@ -23,15 +23,15 @@ bool web_command_moves(const web_command_t *command) {
            web_number(command->yaw_mrad_s, INT32_MIN, INT32_MAX, &yaw) && (v != 0 || yaw != 0);
 }
 
-const char *web_age_wrong(const char *t_us, uint64_t now_us, int64_t *out_t_us) {
+const char *web_age_wrong(const char *t_us, uint64_t gateway_us, int64_t *out_t_us) {
     int64_t since_us = 0;
     if (!web_number(t_us, 0, INT64_MAX, &since_us)) {
         return "it has no time: add boot of /api/challenge, and t_us of the newest state";
     }
-    if ((uint64_t)since_us > now_us + WEB_AHEAD_US) {
+    if ((uint64_t)since_us > gateway_us + WEB_AHEAD_US) {
         return "its t_us is in the future; use t_us of the newest state";
     }
-    if ((uint64_t)since_us < now_us && now_us - (uint64_t)since_us > WEB_AGE_US) {
+    if ((uint64_t)since_us < gateway_us && gateway_us - (uint64_t)since_us > WEB_AGE_US) {
         return "it is older than a second; send it again";
     }
     *out_t_us = since_us;
@@ -39,22 +39,23 @@ const char *web_age_wrong(const char *t_us, uint64_t now_us, int64_t *out_t_us) 
 }
 
 static const char *judge(const web_driver_t *self, const web_command_t *command, const web_limits_t *limits,
-                         uint64_t now_us) {
+                         uint64_t gateway_us) {
     int64_t sequence = 0;
-    int64_t told_us = 0;
+    int64_t stamp_us = 0;
     if (!self->is_driven || !command->is_holders) {
         return "this page does not hold the lease; arm from it";
     }
-    if (!web_number(command->t_us, 0, INT64_MAX, &told_us) || !web_number(command->sequence, 1, INT64_MAX, &sequence)) {
+    if (!web_number(command->t_us, 0, INT64_MAX, &stamp_us) ||
+        !web_number(command->sequence, 1, INT64_MAX, &sequence)) {
         return "a command needs t_us and sequence";
     }
     if (sequence <= self->sequence) {
         return "a newer command has already arrived";
     }
-    if ((uint64_t)told_us > now_us + WEB_AHEAD_US) {
+    if ((uint64_t)stamp_us > gateway_us + WEB_AHEAD_US) {
         return "its t_us is in the future; use t_us of the newest state";
     }
-    if ((uint64_t)told_us < now_us && now_us - (uint64_t)told_us > limits->ttl_us) {
+    if ((uint64_t)stamp_us < gateway_us && gateway_us - (uint64_t)stamp_us > limits->ttl_us) {
         return "too old: the connection is too slow for driving";
     }
     return NULL;
@@ -65,7 +66,7 @@ const char *web_driver_take(web_driver_t *self, const web_command_t *command, co
     const int64_t max = limits->max_speed_mm_s;
     int64_t v = 0;
     int64_t yaw = 0;
-    const char *why = judge(self, command, limits, now_us);
+    const char *why = judge(self, command, limits, now_us + (uint64_t)limits->ahead_us);
     if (why == NULL && (!web_number(command->v_mm_s, -max, max, &v) ||
                         !web_number(command->yaw_mrad_s, -YAW_MAX_MRAD_S, YAW_MAX_MRAD_S, &yaw))) {
         why = "v_mm_s or yaw_mrad_s is outside what this page may drive";

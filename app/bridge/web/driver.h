@@ -39,6 +39,7 @@ typedef struct {
 typedef struct {
     uint32_t max_speed_mm_s;
     uint32_t ttl_us;
+    int64_t ahead_us; ///< The gateway's clock is ahead of `now_us` by this time.
 } web_limits_t;
 
 typedef struct {
@@ -58,9 +59,9 @@ const char *web_driver_take(web_driver_t *self, const web_command_t *command, co
 bool web_command_moves(const web_command_t *command);
 
 /// Judges the age of a request that permits motion or clears a latch. `t_us` is the time of a message of this run of
-/// the machine, at which the person wanted it. Returns NULL and sets `*out_t_us` if it is valid; otherwise the reason:
-/// absent, too old, or in the future.
-const char *web_age_wrong(const char *t_us, uint64_t now_us, int64_t *out_t_us);
+/// the machine, at which the person wanted it; `gateway_us` is the time of the gateway. Returns NULL and sets
+/// `*out_t_us` if it is valid; otherwise the reason: absent, too old, or in the future.
+const char *web_age_wrong(const char *t_us, uint64_t gateway_us, int64_t *out_t_us);
 
 /// Returns true if the person who drives has sent nothing for too long.
 bool web_driver_silent(const web_driver_t *self, uint64_t now_us);

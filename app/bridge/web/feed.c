@@ -105,11 +105,11 @@ size_t web_reader_take(web_reader_t *self, web_feed_t *feed, char *out, size_t s
         return 0;
     }
     const size_t left = self->sending->length - self->sent;
-    const size_t taken = (left < size) ? left : size;
-    memcpy(out, self->sending->text + self->sent, taken);
-    self->sent += taken;
+    const size_t copied = (left < size) ? left : size;
+    memcpy(out, self->sending->text + self->sent, copied);
+    self->sent += copied;
     if (self->sent == self->sending->length) {
         web_reader_end(self);
     }
-    return taken;
+    return copied;
 }

@@ -19,7 +19,7 @@
 #define DAY_S      86400
 #define NAME_SIZE  65U
 
-#define NO_WRITE "let token_file name a folder in which the bridge may write"
+#define NO_WRITE "set token_file to a file in a folder to which the bridge may write"
 #define NO_MAKE  "set certificate and key in the configuration, or leave out --lan"
 
 static int complain(const char *what, const char *why, const char *fix) {
@@ -68,7 +68,7 @@ static int write_file(const char *path, const gnutls_datum_t *data) {
     (void)close(file);
     if (!written) {
         return complain(temporary, strerror(error),
-                        "make room on this disk, or let token_file name a folder on another one");
+                        "delete files on this disk, or set token_file to a folder on another one");
     }
     return (rename(temporary, path) == 0) ? 0
                                           : complain(path, strerror(errno), "remove it, and start the bridge again");
@@ -102,16 +102,37 @@ static int fill(gnutls_x509_crt_t certificate, gnutls_x509_privkey_t key) {
     const time_t now = time(NULL);
     int error = gnutls_rnd(GNUTLS_RND_NONCE, serial, sizeof serial);
     serial[0] = (unsigned char)((serial[0] & 0x7FU) | 0x40U); // Positive, and no leading zero.
-    error = (error == 0) ? gnutls_x509_crt_set_version(certificate, 3) : error;
-    error = (error == 0) ? gnutls_x509_crt_set_serial(certificate, serial, sizeof serial) : error;
-    error = (error == 0) ? gnutls_x509_crt_set_activation_time(certificate, now - DAY_S) : error;
-    error = (error == 0) ? gnutls_x509_crt_set_expiration_time(certificate, now + (time_t)DAYS_VALID * DAY_S) : error;
-    error = (error == 0) ? name_subject(certificate) : error;
-    error = (error == 0) ? gnutls_x509_crt_set_basic_constraints(certificate, 0, -1) : error;
-    error = (error == 0) ? gnutls_x509_crt_set_key_usage(certificate, GNUTLS_KEY_DIGITAL_SIGNATURE) : error;
-    error = (error == 0) ? gnutls_x509_crt_set_key_purpose_oid(certificate, GNUTLS_KP_TLS_WWW_SERVER, 0) : error;
-    error = (error == 0) ? gnutls_x509_crt_set_key(certificate, key) : error;
-    return (error == 0) ? gnutls_x509_crt_sign2(certificate, certificate, key, GNUTLS_DIG_SHA256, 0) : error;
+    if (error == 0) {
+        error = gnutls_x509_crt_set_version(certificate, 3);
+    }
+    if (error == 0) {
+        error = gnutls_x509_crt_set_serial(certificate, serial, sizeof serial);
+    }
+    if (error == 0) {
+        error = gnutls_x509_crt_set_activation_time(certificate, now - DAY_S);
+    }
+    if (error == 0) {
+        error = gnutls_x509_crt_set_expiration_time(certificate, now + (time_t)DAYS_VALID * DAY_S);
+    }
+    if (error == 0) {
+        error = name_subject(certificate);
+    }
+    if (error == 0) {
+        error = gnutls_x509_crt_set_basic_constraints(certificate, 0, -1);
+    }
+    if (error == 0) {
+        error = gnutls_x509_crt_set_key_usage(certificate, GNUTLS_KEY_DIGITAL_SIGNATURE);
+    }
+    if (error == 0) {
+        error = gnutls_x509_crt_set_key_purpose_oid(certificate, GNUTLS_KP_TLS_WWW_SERVER, 0);
+    }
+    if (error == 0) {
+        error = gnutls_x509_crt_set_key(certificate, key);
+    }
+    if (error == 0) {
+        error = gnutls_x509_crt_sign2(certificate, certificate, key, GNUTLS_DIG_SHA256, 0);
+    }
+    return error;
 }
 
 static int write_pair(const web_settings_t *settings, gnutls_x509_crt_t certificate, gnutls_x509_privkey_t key) {
@@ -119,9 +140,15 @@ static int write_pair(const web_settings_t *settings, gnutls_x509_crt_t certific
     gnutls_datum_t text = {NULL, 0};
     int error = gnutls_x509_privkey_generate2(key, GNUTLS_PK_ECDSA,
                                               (unsigned)GNUTLS_CURVE_TO_BITS(GNUTLS_ECC_CURVE_SECP256R1), 0, NULL, 0);
-    error = (error == 0) ? fill(certificate, key) : error;
-    error = (error == 0) ? gnutls_x509_privkey_export2(key, GNUTLS_X509_FMT_PEM, &key_text) : error;
-    error = (error == 0) ? gnutls_x509_crt_export2(certificate, GNUTLS_X509_FMT_PEM, &text) : error;
+    if (error == 0) {
+        error = fill(certificate, key);
+    }
+    if (error == 0) {
+        error = gnutls_x509_privkey_export2(key, GNUTLS_X509_FMT_PEM, &key_text);
+    }
+    if (error == 0) {
+        error = gnutls_x509_crt_export2(certificate, GNUTLS_X509_FMT_PEM, &text);
+    }
     int code = (error == 0) ? 0 : complain("the certificate cannot be made", gnutls_strerror(error), NO_MAKE);
     if (code == 0) {
         code = write_file(settings->web.key, &key_text);
@@ -139,7 +166,9 @@ static int make_pair(const web_settings_t *settings) {
     gnutls_x509_crt_t certificate = NULL;
     gnutls_x509_privkey_t key = NULL;
     int error = gnutls_x509_crt_init(&certificate);
-    error = (error == 0) ? gnutls_x509_privkey_init(&key) : error;
+    if (error == 0) {
+        error = gnutls_x509_privkey_init(&key);
+    }
     const int code = (error == 0) ? write_pair(settings, certificate, key)
                                   : complain("the certificate cannot be made", gnutls_strerror(error), NO_MAKE);
     gnutls_x509_privkey_deinit(key);
@@ -152,8 +181,12 @@ static const char *fault_of(const char *path) {
     gnutls_datum_t text = {NULL, 0};
     gnutls_x509_crt_t certificate = NULL;
     int error = gnutls_load_file(path, &text);
-    error = (error == 0) ? gnutls_x509_crt_init(&certificate) : error;
-    error = (error == 0) ? gnutls_x509_crt_import(certificate, &text, GNUTLS_X509_FMT_PEM) : error;
+    if (error == 0) {
+        error = gnutls_x509_crt_init(&certificate);
+    }
+    if (error == 0) {
+        error = gnutls_x509_crt_import(certificate, &text, GNUTLS_X509_FMT_PEM);
+    }
     const char *fault = (error == 0) ? NULL : gnutls_strerror(error);
     if (error == 0 && gnutls_x509_crt_get_expiration_time(certificate) <= time(NULL) + DAY_S) {
         fault = "it has expired";
@@ -192,7 +225,8 @@ static void add_host(web_settings_t *settings) {
     if (strlen(all) < sizeof settings->web.hosts) {
         memcpy(settings->web.hosts, all, strlen(all) + 1U);
     } else {
-        (void)complain("hosts", "there is no room for the name of this machine", "shorten hosts in the configuration");
+        (void)complain("hosts", "the name of this machine does not fit into the list",
+                       "shorten hosts in the configuration");
     }
 }
 
@@ -209,8 +243,7 @@ int web_lan_prepare(web_settings_t *settings) {
     const int other =
         snprintf(settings->web.key, sizeof settings->web.key, "%.*slan-key.pem", length, settings->web.token_file);
     if (one >= (int)sizeof settings->web.certificate || other >= (int)sizeof settings->web.key) {
-        return complain(settings->web.token_file, "its folder's name is too long",
-                        "let token_file name a folder with a shorter name");
+        return complain(settings->web.token_file, "its folder's name is too long", "set token_file to a shorter path");
     }
     return is_good(settings) ? 0 : make_pair(settings);
 }

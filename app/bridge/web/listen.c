@@ -101,7 +101,7 @@ static int listen_tcp(const char *text, uint32_t port) {
 }
 
 /// Writes the addresses that the page needs: `listen`, and for loopback both families. Returns their number.
-static unsigned wanted(const web_settings_t *settings, const char *out[WEB_DOOR_LISTENERS]) {
+static unsigned wanted(const web_settings_t *settings, const char *out[WEB_BACKLOG_LISTENERS]) {
     const char *listen = settings->web.listen;
     const bool loopback = strcmp(listen, "127.0.0.1") == 0 || strcmp(listen, "::1") == 0;
     out[0] = loopback ? "127.0.0.1" : listen;
@@ -114,8 +114,8 @@ static bool has_none(int error) {
     return error == EAFNOSUPPORT || error == EADDRNOTAVAIL;
 }
 
-static int open_own(const web_settings_t *settings, int out_fds[WEB_DOOR_LISTENERS]) {
-    const char *texts[WEB_DOOR_LISTENERS];
+static int open_own(const web_settings_t *settings, int out_fds[WEB_BACKLOG_LISTENERS]) {
+    const char *texts[WEB_BACKLOG_LISTENERS];
     const unsigned count = wanted(settings, texts);
     for (unsigned i = 0; i < count; i++) {
         out_fds[i] = listen_tcp(texts[i], settings->web.port);
@@ -165,8 +165,8 @@ static bool lacks_v6(const web_settings_t *settings) {
     return fd < 0 && has_none(errno);
 }
 
-static int take_passed(const web_settings_t *settings, unsigned count, int out_fds[WEB_DOOR_LISTENERS]) {
-    const char *texts[WEB_DOOR_LISTENERS];
+static int take_passed(const web_settings_t *settings, unsigned count, int out_fds[WEB_BACKLOG_LISTENERS]) {
+    const char *texts[WEB_BACKLOG_LISTENERS];
     const unsigned needed = web_settings_is_unix(settings) ? 0U : wanted(settings, texts);
     unsigned found = 0;
     for (unsigned i = 0; i < needed; i++) {
@@ -186,7 +186,7 @@ static int take_passed(const web_settings_t *settings, unsigned count, int out_f
     return 0;
 }
 
-int web_listen(const web_settings_t *settings, int out_fds[WEB_DOOR_LISTENERS]) {
+int web_listen(const web_settings_t *settings, int out_fds[WEB_BACKLOG_LISTENERS]) {
     const unsigned passed = count_passed();
     int code = 0;
     out_fds[0] = -1;
@@ -198,12 +198,12 @@ int web_listen(const web_settings_t *settings, int out_fds[WEB_DOOR_LISTENERS]) 
         if (out_fds[0] < 0) {
             char what[256];
             (void)snprintf(what, sizeof what, "cannot listen on %s: %s", settings->web.listen, strerror(errno));
-            code = complain(what, "remove what is there if it is not needed, or let listen name another path");
+            code = complain(what, "remove the file if it is not needed, or set listen to another path");
         }
     } else {
         code = open_own(settings, out_fds);
     }
-    for (unsigned i = 0; code != 0 && i < WEB_DOOR_LISTENERS; i++) {
+    for (unsigned i = 0; code != 0 && i < WEB_BACKLOG_LISTENERS; i++) {
         if (out_fds[i] >= 0) {
             (void)close(out_fds[i]);
         }
@@ -211,10 +211,10 @@ int web_listen(const web_settings_t *settings, int out_fds[WEB_DOOR_LISTENERS]) 
     return code;
 }
 
-int web_listen_verify(const web_settings_t *settings, const int fds[WEB_DOOR_LISTENERS]) {
-    const char *texts[WEB_DOOR_LISTENERS];
+int web_listen_verify(const web_settings_t *settings, const int fds[WEB_BACKLOG_LISTENERS]) {
+    const char *texts[WEB_BACKLOG_LISTENERS];
     const bool local = web_settings_is_unix(settings) || wanted(settings, texts) > 1U;
-    return bridge_reach_is_local("iwheel-web", fds, local ? 0U : WEB_DOOR_LISTENERS) ? 0 : EX_UNAVAILABLE;
+    return bridge_reach_is_local("iwheel-web", fds, local ? 0U : WEB_BACKLOG_LISTENERS) ? 0 : EX_UNAVAILABLE;
 }
 
 void web_listen_end(const web_settings_t *settings) {

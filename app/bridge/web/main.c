@@ -52,7 +52,8 @@ static int end_output(void) {
     if (fflush(stdout) == 0) {
         return 0;
     }
-    (void)fprintf(stderr, "iwheel-web: standard output: %s; send it to a terminal, or to a file with room\n",
+    (void)fprintf(stderr,
+                  "iwheel-web: standard output: %s; send it to a terminal, or to a file on a disk with free space\n",
                   strerror(errno));
     return EX_IOERR;
 }
@@ -115,7 +116,7 @@ static int check(const web_settings_t *settings) {
 static int loop(web_server_t *server) {
     bridge_service_t service;
     bridge_service_open(&service);
-    bridge_service_tell(&service, "READY=1");
+    bridge_service_notify(&service, "READY=1");
     for (;;) {
         int fds[WEB_SERVER_FDS];
         struct pollfd waits[WEB_SERVER_FDS + 1U] = {{bridge_link_fd(&server->link.gateway), POLLIN, 0}};
@@ -124,7 +125,7 @@ static int loop(web_server_t *server) {
             waits[i + 1U] = (struct pollfd){fds[i], POLLIN, 0};
         }
         if (!bridge_service_wait(waits, sizeof waits / sizeof waits[0], web_server_wait_ms(server))) {
-            bridge_service_tell(&service, "STOPPING=1");
+            bridge_service_notify(&service, "STOPPING=1");
             return 0;
         }
         const int code = web_server_step(server);
@@ -140,7 +141,9 @@ static int run(const web_settings_t *settings, bool shows) {
     static web_server_t server;
     bridge_service_take_signals();
     int code = web_server_open(&server, settings);
-    code = (code == 0 && shows) ? print_url(settings) : code;
+    if (code == 0 && shows) {
+        code = print_url(settings);
+    }
     if (code == 0) {
         (void)fprintf(stderr, "iwheel-web: on %s port %u%s\n", settings->web.listen, settings->web.port,
                       shows ? "" : "; its address with the token: iwheel-web --url");

@@ -19,10 +19,12 @@ static bool make(const web_token_t *self, FILE *err) {
     char temporary[128];
     (void)snprintf(temporary, sizeof temporary, "%s.new", self->path);
     (void)unlink(temporary);
-    const int file = open(temporary, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0600);
-    if (file < 0 || !bridge_secret_draw(token)) {
+    const int file =
+        bridge_secret_draw(token) ? open(temporary, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0600) : -1;
+    if (file < 0) {
         (void)complain(self, strerror(errno), err);
-        return complain(self, "cannot be made; let token_file name a folder in which the bridge may write", err);
+        return complain(self, "cannot be created; set token_file to a file in a folder to which the bridge may write",
+                        err);
     }
     token[WEB_TOKEN_SIZE - 1U] = '\n';
     const bool written = write(file, token, sizeof token) == (ssize_t)sizeof token;
@@ -65,7 +67,7 @@ static int open_in_force(const web_token_t *self, FILE *err) {
     if (self->only_reads) {
         if (file < 0) {
             (void)complain(self,
-                           none ? "is not there; iwheel-web makes it when it runs: systemctl start iwheel-web"
+                           none ? "does not exist; iwheel-web creates it at its start: systemctl start iwheel-web"
                                 : strerror(errno),
                            err);
         }
@@ -98,7 +100,7 @@ bool web_token_refresh(web_token_t *self, bool *out_changed, FILE *err) {
     const bool good = ours && read_file(self, file, &status, out_changed);
     (void)close(file);
     if (!ours) {
-        return complain(self, "others may read or write it; delete it, and the bridge makes a new one", err);
+        return complain(self, "other users may read or write it; delete it, and the bridge makes a new one", err);
     }
     return good || complain(self, "contains no token; delete it, and the bridge makes a new one", err);
 }

@@ -98,13 +98,18 @@ static void name_of(const web_call_t *self, char out[BRIDGE_NAME_SIZE]) {
     (void)snprintf(out, BRIDGE_NAME_SIZE, "web page %" PRIu64, self->session);
 }
 
+static int64_t ahead_us(const web_server_t *server) {
+    return bridge_link_ahead_us(&server->link.gateway, server->now_us);
+}
+
 /// Returns why the age of the request is not valid; NULL if it is valid.
 static const char *age_wrong(const web_call_t *self, int64_t *out_t_us) {
     const char *boot = web_call_argument(self, "boot");
     if (boot == NULL || strcmp(boot, self->server->boot) != 0) {
         return "it does not belong to this run of the bridge; quote boot of /api/challenge";
     }
-    return web_age_wrong(web_call_argument(self, "t_us"), self->server->now_us, out_t_us);
+    const uint64_t gateway_us = self->server->now_us + (uint64_t)ahead_us(self->server);
+    return web_age_wrong(web_call_argument(self, "t_us"), gateway_us, out_t_us);
 }
 
 static enum MHD_Result refuse_stick(web_call_t *self, const char *who) {
@@ -157,7 +162,8 @@ static enum MHD_Result ask_drive(web_call_t *self) {
     const bool is_holders = bridge_lease_is_holder(&server->link.lease, key) && self->session == server->driver_session;
     const web_command_t command = {is_holders, web_call_argument(self, "t_us"), web_call_argument(self, "sequence"),
                                    web_call_argument(self, "v_mm_s"), web_call_argument(self, "yaw_mrad_s")};
-    const web_limits_t limits = {server->settings->drive.max_speed_mm_s, server->settings->drive.ttl_ms * 1000U};
+    const web_limits_t limits = {server->settings->drive.max_speed_mm_s, server->settings->drive.ttl_ms * 1000U,
+                                 ahead_us(server)};
     if (web_command_moves(&command)) {
         name_of(self, name);
         bridge_movers_note(&server->movers, name, server->now_us);
@@ -182,7 +188,7 @@ static enum MHD_Result ask_reset(web_call_t *self) {
     const char *who = who_moves(self, NULL);
     if (why == NULL && (!web_number(web_call_argument(self, "stop"), 1, INT64_MAX, &stop) ||
                         (uint64_t)stop != self->server->link.stop_number)) {
-        why = "it does not name the last stop; read the cause of that stop, then send it again";
+        why = "the request does not name the last stop; read the cause of that stop, then send it again";
     }
     if (why != NULL) {
         return web_call_refuse(self, 409, "stale_command", why);

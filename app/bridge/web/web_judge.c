@@ -19,6 +19,7 @@ static const web_route_t routes[] = {
     {"GET", "/proof.js", WEB_FILE, "proof.js", JS},
     {"GET", "/plots.js", WEB_FILE, "plots.js", JS},
     {"GET", "/recordings.js", WEB_FILE, "recordings.js", JS},
+    {"GET", "/mcap.js", WEB_FILE, "mcap.js", JS},
     {"GET", "/link.js", WEB_FILE, "link.js", JS},
     {"GET", "/state.js", WEB_FILE, "state.js", JS},
     {"GET", "/stop.js", WEB_FILE, "stop.js", JS},
@@ -200,8 +201,8 @@ web_verdict_t web_judge(const web_rules_t *rules, const web_asked_t *asked) {
                             "docs/user/web.md");
     }
     if (route == NULL) {
-        return other_method ? refuse(405, "bad_method", "another method: see docs/user/web.md")
-                            : refuse(404, "not_there", "there is nothing here: see docs/user/web.md");
+        return other_method ? refuse(405, "bad_method", "this address needs another method: see docs/user/web.md")
+                            : refuse(404, "not_there", "this address does not exist: see docs/user/web.md");
     }
     if ((route->verb == WEB_ARM || route->verb == WEB_DRIVE) && !rules->may_drive) {
         return refuse(403, "denied", "driving is not configured: set enabled = yes under [drive] in web.conf");

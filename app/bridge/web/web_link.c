@@ -9,7 +9,7 @@
 /// Rate of the event `state` while no client reads it. The first state that a client reads is still fresh.
 #define IDLE_HZ 2U
 /// Time from the last read of the state by a client to that rate.
-#define LOOKED_US 5000000U
+#define POLLED_US 5000000U
 /// Delay after a stop until the frames after it are recorded.
 #define WHY_US 2500000U
 /// Delay of another try when all places for questions are in use.
@@ -90,7 +90,7 @@ static void forget_state(web_link_t *self) {
 static void gateway_here(void *context, uint64_t now_us) {
     web_link_t *self = context;
     self->why_us = now_us;
-    self->looked_us = now_us;
+    self->polled_us = now_us;
     (void)web_feed_add(&self->feed, "gateway", "{\"event\":\"gateway\",\"connected\":true}", 36, false);
 }
 
@@ -121,7 +121,7 @@ void web_link_close(web_link_t *self) {
 }
 
 int web_link_step(web_link_t *self, uint64_t now_us) {
-    const bool idle = now_us - self->looked_us > LOOKED_US && self->rate_hz > IDLE_HZ;
+    const bool idle = now_us - self->polled_us > POLLED_US && self->rate_hz > IDLE_HZ;
     bridge_link_rate(&self->gateway, idle ? IDLE_HZ : self->rate_hz, now_us);
     const int code = bridge_link_step(&self->gateway, now_us);
     bridge_lease_step(&self->lease, now_us);

@@ -14,7 +14,7 @@ typedef struct {
     bridge_link_t gateway;
     bridge_lease_t lease; ///< Lease of the person who drives through this bridge.
     unsigned rate_hz;     ///< Rate of the event `state` while a client reads it; otherwise 2 Hz.
-    uint64_t looked_us;   ///< Time of the last read of the state by a client. The reader sets it.
+    uint64_t polled_us;   ///< Time of the last read of the state by a client. The reader sets it.
     uint64_t why_us;      ///< Time of the next request `why`; 0: none.
     uint64_t stop_number; ///< Number of the newest stop in `stops`.
     uint64_t state_us;    ///< Time of the newest state.

@@ -13,7 +13,7 @@
 #include <sysexits.h>
 #include <unistd.h>
 
-#define LOOK_US         1000000U
+#define POLL_US         1000000U
 #define LONGEST_WAIT_MS 250
 #define NEWCOMERS_MAX   16U
 /// Largest table of a fleet: a thousand machines need about 500 kB.
@@ -50,8 +50,7 @@ static int read_page(web_server_t *self) {
     for (size_t i = 0; routes[i].path != NULL && routes[i].verb == WEB_FILE && i < WEB_FILES; i++) {
         (void)snprintf(path, sizeof path, "%s/%s", self->settings->web.page, routes[i].file);
         if (!page_file_read(&self->files[i], path)) {
-            return complain(EX_CONFIG, path,
-                            "cannot be read; let page under [web] name the folder of the page's files");
+            return complain(EX_CONFIG, path, "cannot be read; set page under [web] to the folder of the page's files");
         }
     }
     return 0;
@@ -76,7 +75,7 @@ static int read_certificate(web_server_t *self) {
     if (!is_secret(self->settings->web.key)) {
         return complain(
             EX_NOPERM, self->settings->web.key,
-            "may be read by others, or written by its group; chmod 0640, and let its group be the bridge's");
+            "may be read by others, or written by its group; chmod it to 0640, and set its group to the bridge's");
     }
     self->key = page_read_all(self->settings->web.key, &length);
     return (self->key != NULL) ? 0
@@ -110,7 +109,7 @@ static void take_peer(void *context, struct MHD_Connection *connection, void **p
     *place = NULL;
 }
 
-__attribute__((format(printf, 2, 0))) static void say_nothing(void *context, const char *format, va_list list) {
+__attribute__((format(printf, 2, 0))) static void discard_log(void *context, const char *format, va_list list) {
     (void)context; // Input of hostile peers is not logged.
     (void)format;
     (void)list;
@@ -137,7 +136,7 @@ static struct MHD_Daemon *start(web_server_t *self) {
     const unsigned flags = MHD_USE_EPOLL | MHD_USE_NO_LISTEN_SOCKET | MHD_ALLOW_SUSPEND_RESUME |
                            ((self->certificate != NULL) ? MHD_USE_TLS : 0U);
     return MHD_start_daemon(
-        flags, 0, NULL, NULL, web_call_handle, self, MHD_OPTION_EXTERNAL_LOGGER, say_nothing, NULL, MHD_OPTION_ARRAY,
+        flags, 0, NULL, NULL, web_call_handle, self, MHD_OPTION_EXTERNAL_LOGGER, discard_log, NULL, MHD_OPTION_ARRAY,
         (self->certificate != NULL) ? tls : plain, MHD_OPTION_CONNECTION_LIMIT, self->settings->web.max_connections,
         MHD_OPTION_CONNECTION_TIMEOUT, 15U, MHD_OPTION_CONNECTION_MEMORY_LIMIT, (size_t)BYTES_PER_CONNECTION,
         MHD_OPTION_NOTIFY_COMPLETED, web_call_completed, self, MHD_OPTION_NOTIFY_CONNECTION, take_peer, self,
@@ -146,7 +145,7 @@ static struct MHD_Daemon *start(web_server_t *self) {
 }
 
 int web_server_check(web_server_t *self, const web_settings_t *settings) {
-    *self = (web_server_t){.settings = settings, .door = {.listen_fds = {-1, -1}, .epoll_fd = -1}};
+    *self = (web_server_t){.settings = settings, .backlog = {.listen_fds = {-1, -1}, .epoll_fd = -1}};
     self->now_us = bridge_now_us();
     self->token = (web_token_t){.path = settings->web.token_file, .hours = settings->web.token_hours};
     const int code = read_page(self);
@@ -155,7 +154,7 @@ int web_server_check(web_server_t *self, const web_settings_t *settings) {
 
 int web_server_open(web_server_t *self, const web_settings_t *settings) {
     bool changed = false;
-    int fds[WEB_DOOR_LISTENERS];
+    int fds[WEB_BACKLOG_LISTENERS];
     int code = web_server_check(self, settings);
     if (code != 0) {
         return code;
@@ -173,7 +172,7 @@ int web_server_open(web_server_t *self, const web_settings_t *settings) {
     if (code != 0) {
         return code;
     }
-    if (!web_door_open(&self->door, fds)) {
+    if (!web_backlog_open(&self->backlog, fds)) {
         return complain(EX_OSERR, "cannot wait for connections", strerror(errno));
     }
     self->daemon = start(self);
@@ -181,7 +180,7 @@ int web_server_open(web_server_t *self, const web_settings_t *settings) {
         return complain(EX_CONFIG, settings->web.certificate,
                         "does not fit the key; set certificate and key to a pair of PEM files");
     }
-    return web_listen_verify(settings, self->door.listen_fds);
+    return web_listen_verify(settings, self->backlog.listen_fds);
 }
 
 void web_server_close(web_server_t *self) {
@@ -194,8 +193,8 @@ void web_server_close(web_server_t *self) {
         web_link_close(&self->link); // Answers pending requests.
         MHD_stop_daemon(self->daemon);
     }
-    if (self->door.listen_fds[0] >= 0) {
-        web_door_close(&self->door);
+    if (self->backlog.listen_fds[0] >= 0) {
+        web_backlog_close(&self->backlog);
         web_listen_end(self->settings);
     }
     for (size_t i = 0; i < WEB_FILES; i++) {
@@ -257,14 +256,14 @@ static unsigned count_peers(const web_server_t *self) {
 }
 
 /// Passes connections that have sent something from the list of new ones to the library.
-static void let_in(web_server_t *self) {
+static void accept_new(web_server_t *self) {
     const unsigned newcomers = newcomers_max(self);
     unsigned count = count_peers(self);
-    web_door_step(&self->door, self->now_us);
+    web_backlog_step(&self->backlog, self->now_us);
     for (unsigned i = 0; i < newcomers; i++) {
         struct sockaddr_storage address = {.ss_family = AF_UNSPEC};
         socklen_t size = sizeof address;
-        const int fd = web_door_take(&self->door);
+        const int fd = web_backlog_take(&self->backlog);
         if (fd < 0) {
             return;
         }
@@ -281,7 +280,7 @@ static void let_in(web_server_t *self) {
     }
 }
 
-static void look_at_token(web_server_t *self) {
+static void check_token(web_server_t *self) {
     bool changed = false;
     (void)web_token_refresh(&self->token, &changed, stderr);
     for (web_call_t *stream = self->streams; changed && stream != NULL; stream = stream->next) {
@@ -306,7 +305,7 @@ static void let_go(web_server_t *self) {
 int web_server_step(web_server_t *self) {
     self->now_us = bridge_now_us();
     if (self->streams != NULL) {
-        self->link.looked_us = self->now_us;
+        self->link.polled_us = self->now_us;
     }
     const int code = web_link_step(&self->link, self->now_us);
     if (code != 0) {
@@ -314,16 +313,16 @@ int web_server_step(web_server_t *self) {
     }
     let_go(self);
     for (web_call_t *stream = self->streams; stream != NULL; stream = stream->next) {
-        if (web_reader_waits(&stream->reader, &self->link.feed) || self->now_us - stream->told_us >= WEB_PULSE_US) {
+        if (web_reader_waits(&stream->reader, &self->link.feed) || self->now_us - stream->written_us >= WEB_PULSE_US) {
             web_call_resume(stream);
         }
     }
-    let_in(self);
+    accept_new(self);
     (void)MHD_run(self->daemon);
-    if (self->now_us >= self->look_us) {
-        self->look_us = self->now_us + LOOK_US;
+    if (self->now_us >= self->poll_us) {
+        self->poll_us = self->now_us + POLL_US;
         close_idle_peers(self);
-        look_at_token(self);
+        check_token(self);
     }
     return 0;
 }
@@ -331,8 +330,8 @@ int web_server_step(web_server_t *self) {
 int web_server_wait_ms(const web_server_t *self) {
     const uint64_t now_us = bridge_now_us();
     const uint64_t link_us = web_link_next_us(&self->link, now_us);
-    const uint64_t door_us = web_door_next_us(&self->door, now_us);
-    const uint64_t next_us = (link_us < door_us) ? link_us : door_us;
+    const uint64_t backlog_us = web_backlog_next_us(&self->backlog, now_us);
+    const uint64_t next_us = (link_us < backlog_us) ? link_us : backlog_us;
     unsigned MHD_LONG_LONG http_ms = LONGEST_WAIT_MS;
     if (MHD_get_timeout(self->daemon, &http_ms) != MHD_YES || http_ms > LONGEST_WAIT_MS) {
         http_ms = LONGEST_WAIT_MS;
@@ -344,8 +343,8 @@ int web_server_wait_ms(const web_server_t *self) {
 void web_server_fds(const web_server_t *self, int out_fds[WEB_SERVER_FDS]) {
     const union MHD_DaemonInfo *info = MHD_get_daemon_info(self->daemon, MHD_DAEMON_INFO_EPOLL_FD);
     out_fds[0] = (info != NULL) ? info->epoll_fd : -1;
-    out_fds[1] = self->door.epoll_fd;
-    for (unsigned i = 0; i < WEB_DOOR_LISTENERS; i++) {
-        out_fds[2U + i] = web_door_fd(&self->door, i, bridge_now_us());
+    out_fds[1] = self->backlog.epoll_fd;
+    for (unsigned i = 0; i < WEB_BACKLOG_LISTENERS; i++) {
+        out_fds[2U + i] = web_backlog_fd(&self->backlog, i, bridge_now_us());
     }
 }

@@ -7,7 +7,7 @@
 #ifndef WEB_SERVER_H
 #define WEB_SERVER_H
 
-#include "door.h"
+#include "backlog.h"
 #include "driver.h"
 #include "metrics.h"
 #include "page_file.h"
@@ -56,7 +56,7 @@ typedef struct web_call {
     size_t length;
     unsigned status;
     web_reader_t reader; ///< WEB_EVENTS
-    uint64_t told_us;    ///< Time of the last bytes of the stream.
+    uint64_t written_us; ///< Time of the last bytes of the stream.
     struct web_call *next;
 } web_call_t;
 
@@ -72,7 +72,7 @@ struct web_server {
     web_own_t own;
     page_file_t files[WEB_FILES]; ///< Indexed like the routes.
     struct MHD_Daemon *daemon;
-    web_door_t door;
+    web_backlog_t backlog;
     web_peer_t *peers; ///< Newest first.
     web_call_t *streams;
     unsigned stream_count;
@@ -80,7 +80,7 @@ struct web_server {
     char *certificate;
     char *key;
     uint64_t now_us;
-    uint64_t look_us; ///< Time of the next check of peers and token.
+    uint64_t poll_us; ///< Time of the next check of peers and token.
     bool ending;
 };
 
@@ -102,7 +102,7 @@ int web_server_step(web_server_t *self);
 int web_server_wait_ms(const web_server_t *self);
 
 /// Writes the descriptors of HTTP for poll(); -1: not now.
-#define WEB_SERVER_FDS (2U + WEB_DOOR_LISTENERS)
+#define WEB_SERVER_FDS (2U + WEB_BACKLOG_LISTENERS)
 void web_server_fds(const web_server_t *self, int out_fds[WEB_SERVER_FDS]);
 
 /// Returns the largest number of event streams. The other connections are for requests and for clients without a proof

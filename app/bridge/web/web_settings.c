@@ -21,7 +21,7 @@ static const char *wrong_listen(const char *text) {
         return settings_wrong_address(text);
     }
     const bool good = inet_pton(AF_INET, text, &address) == 1 || inet_pton(AF_INET6, text, &address) == 1;
-    return good ? NULL : "is no address; write one, such as 127.0.0.1, or unix:PATH";
+    return good ? NULL : "is not an address; write one, such as 127.0.0.1, or unix:PATH";
 }
 
 /// Returns why a text is not valid. It becomes part of JSON and of a link, so it must be an address of https or http
@@ -30,7 +30,7 @@ static const char *wrong_page(const char *text) {
     static const char permitted[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789:/._-{}[]";
     const bool is_address = strncmp(text, "https://", 8) == 0 || strncmp(text, "http://", 7) == 0;
     const bool good = strcmp(text, "none") == 0 || (is_address && text[strspn(text, permitted)] == '\0');
-    return good ? NULL : "is no address of a page; write one, such as https://{machine}.local:8470/, or none";
+    return good ? NULL : "is not the address of a page; write one, such as https://{machine}.local:8470/, or none";
 }
 
 static const settings_key_t keys[] = {

@@ -23,10 +23,11 @@ static void report_state(const ctl_t *self, const json_t *reply) {
         const char *state;
         const char *meaning;
     } meanings[] = {
-        {"listening", "listening: nothing is sent; in silence the wheels may roll"},
+        {"listening", "listening: nothing is sent; without setpoints the wheels may roll"},
         {"armed", "armed: a client drives"},
-        {"stopping", "stopping: ramp to zero, zeros until both wheels are at standstill, then silence, or zeros with "
-                     "after_stop = hold"},
+        {"stopping",
+         "stopping: ramp to zero, then zeros until both wheels are at standstill; after that nothing is sent "
+         "(after_stop = hold: the zeros continue)"},
         {"latched", "latched: zero; only a reset leaves this state (see: iwheelctl status)"},
     };
     if (!self->json) {
@@ -56,17 +57,27 @@ static int ask_and_report_state(ctl_t *self, json_t *request) {
     return finish(self, code, reply);
 }
 
-static int stop_and_report_state(ctl_t *self, const ctl_stop_t *stop) {
-    json_t *reply = NULL;
-    const int code = ctl_stop(self, stop, &reply);
-    return finish(self, code, reply);
+static void report_stopped(const ctl_t *self, const char *path, const json_t *reply) {
+    if (path != NULL && !self->json) {
+        text_safe(path, stdout);
+        (void)fputs(": ", stdout);
+    }
+    report_state(self, reply);
+}
+
+/// The verbs `stop` and `disarm` send the same request; an error names the verb that the user typed. A superfluous word
+/// is reported after the stop and does not prevent it.
+static int stop_as(const char *verb, ctl_t *self, int count, char **words) {
+    const int code = ctl_stop(self, &(ctl_stop_t){.latches = false}, report_stopped);
+    return (words_at_most(verb, count, 0, words) || code != CTL_OK) ? code : CTL_USAGE;
 }
 
 int verb_stop(ctl_t *self, int count, char **words) {
-    if (!words_at_most("stop", count, 0, words)) {
-        return CTL_USAGE;
-    }
-    return stop_and_report_state(self, &(ctl_stop_t){.latches = false});
+    return stop_as("stop", self, count, words);
+}
+
+int verb_disarm(ctl_t *self, int count, char **words) {
+    return stop_as("disarm", self, count, words);
 }
 
 int verb_estop(ctl_t *self, int count, char **words) {
@@ -75,7 +86,7 @@ int verb_estop(ctl_t *self, int count, char **words) {
     for (int i = 0; i < count; i++) {
         IWN_TEXT_JOIN(&text, (i > 0) ? " " : "", words[i]);
     }
-    return stop_and_report_state(self, &(ctl_stop_t){.latches = true, .reason = (text.length > 0U) ? reason : NULL});
+    return ctl_stop(self, &(ctl_stop_t){.latches = true, .reason = (text.length > 0U) ? reason : NULL}, report_stopped);
 }
 
 int verb_reset(ctl_t *self, int count, char **words) {

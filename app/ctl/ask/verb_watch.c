@@ -15,7 +15,7 @@
 
 #define RATE_MAX_HZ 100
 /// Interval at which a watch without events checks that its output is still read.
-#define LOOK_US 500000
+#define POLL_US 500000
 
 /// Number of topics, from the first one on, that are watched if none is named.
 #define TOPICS_USUAL ((unsigned)IWN_TOPIC_STOP + 1U)
@@ -144,7 +144,7 @@ static int pump(ctl_t *self) {
     output_t output = OUTPUT_OPEN;
     while (output == OUTPUT_OPEN) {
         json_t *line = NULL;
-        const iwc_result_t result = client_receive(&self->client, client_now_us() + LOOK_US, &line);
+        const iwc_result_t result = client_receive(&self->client, client_now_us() + POLL_US, &line);
         if (result == IWC_INTERRUPTED) {
             return CTL_OK;
         }

@@ -77,7 +77,7 @@ typedef struct {
     int rpm[IW_SIDES];
     long long reboots; ///< Sum of both wheels.
     bool heard;        ///< Both wheels are online.
-} hand_look_t;
+} hand_sample_t;
 
 /// Counts of the wheels while hands moved them, in the wheels' own sense of rotation.
 typedef struct {
@@ -86,10 +86,10 @@ typedef struct {
     double rpm_turns[IW_SIDES];  ///< Reported rpm, integrated over time without stalls.
     long long rpm_way[IW_SIDES]; ///< Ticks of the same time.
     hand_gap_t gap;              ///< The first gap.
-    hand_look_t last;            ///< Last answer with both wheels online.
-    int64_t heard_us;            ///< Time of `last`.
-    int64_t looked_us;
-    int64_t offline_us; ///< Time offline since `heard_us`, without stalls.
+    hand_sample_t last;          ///< Last answer with both wheels online.
+    int64_t received_us;         ///< Time of `last`.
+    int64_t polled_us;
+    int64_t offline_us; ///< Time offline since `received_us`, without stalls.
 } hand_t;
 
 /// A short movement of both wheels.
@@ -114,7 +114,7 @@ typedef struct {
 // --- talking (bringup_talk.c) ------------------------------------------------------------------------------------
 
 /// Prints a paragraph, broken into lines.
-__attribute__((format(printf, 1, 2))) void talk_say(const char *format, ...);
+__attribute__((format(printf, 1, 2))) void talk_print(const char *format, ...);
 
 /// Prints the heading of a step.
 void talk_step(unsigned number, const char *title);
@@ -132,7 +132,8 @@ bool talk_number(bringup_t *self, const char *question, double low, double high,
 /// Discards input from before the question.
 void talk_forget(void);
 
-/// From begin to end, a key is received immediately, without Enter.
+/// From begin to end, a key is received immediately, without Enter. Neither call discards input: a key since the last
+/// question counts as pressed until the next question.
 void talk_keys_begin(void);
 void talk_keys_end(void);
 /// Returns true if a key was pressed or the input ended.
@@ -152,8 +153,8 @@ void trial_close(bringup_t *self);
 /// Returns a new reference to the status of the trial gateway, or NULL.
 json_t *trial_status(bringup_t *self);
 /// Waits until both wheels are online and at standstill and no e-stop is pressed. Returns false after it has printed
-/// the reason if that does not happen.
-bool trial_wait_ready(bringup_t *self);
+/// the reason if that does not happen; with `key_ends` also, without a message, when a key is pressed.
+bool trial_wait_ready(bringup_t *self, bool key_ends);
 /// Runs the burst, reports it to the operator before and after, and offers to repeat it after a failure. Returns false
 /// if the burst was not done and the operator wants no repetition.
 bool burst_show(bringup_t *self, const burst_t *burst, outcome_t *out_outcome);
@@ -167,9 +168,9 @@ void burst_insist(bringup_t *self, const burst_t *burst, outcome_t *out_outcome)
 void hand_follow(bringup_t *self, const char *prompt, hand_t *out_hand);
 
 /// Starts the sum with this answer.
-void hand_begin(hand_t *out_hand, const hand_look_t *first, int64_t now_us);
+void hand_begin(hand_t *out_hand, const hand_sample_t *first, int64_t now_us);
 /// Adds the next answer.
-void hand_add(hand_t *self, const hand_look_t *now, int64_t now_us);
+void hand_add(hand_t *self, const hand_sample_t *now, int64_t now_us);
 /// Returns false after it has printed why the count is not complete.
 bool hand_is_complete(const hand_t *hand);
 /// Returns the turns that the rpm show as a share of the rotor's turns; 0 if too little of them was measured.

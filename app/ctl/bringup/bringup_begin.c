@@ -10,7 +10,7 @@
 
 #define PRESS_US    60000000
 #define RELEASED_US 500000
-#define LOOK_NS     20000000L
+#define POLL_NS     20000000L
 
 void bringup_checks(bringup_t *self) {
     doctor_t *doctor = calloc(1, sizeof(*doctor));
@@ -24,18 +24,18 @@ void bringup_checks(bringup_t *self) {
     doctor->config = self->config;
     doctor->bus = self->config.bus.interface;
     inspect_begin(&doctor->findings);
-    near_look(self->ctl, doctor->bus, &doctor->gateway);
+    near_find(self->ctl, doctor->bus, &doctor->gateway);
     bool good = doctor->gateway.result != NEAR_FOUND;
     if (!good) {
-        talk_say("A gateway already runs on this bus (%s). Two cannot drive the same wheels: stop it "
-                 "(systemctl stop iwheel-gateway, or end its terminal), then start bringup again.",
-                 doctor->gateway.path);
-    } else if (doctor_look_at_machine(doctor)) {
-        doctor_look_at_bus(doctor);
+        talk_print("A gateway already runs on this bus (%s). Two cannot drive the same wheels: stop it "
+                   "(systemctl stop iwheel-gateway, or end its terminal), then start bringup again.",
+                   doctor->gateway.path);
+    } else if (doctor_check_machine(doctor)) {
+        doctor_check_bus(doctor);
     }
     doctor_print(doctor, 0);
     if (good && doctor->findings.total[INSPECT_FAIL] > 0U) {
-        talk_say("Fix the failed checks (each line has the fix), then start bringup again.");
+        talk_print("Fix the failed checks (each line has the fix), then start bringup again.");
         good = false;
     }
     doctor_close(doctor);
@@ -51,8 +51,9 @@ void bringup_checks(bringup_t *self) {
 static bool await_estop(bringup_t *self, const char *wanted, int64_t for_us) {
     const int64_t end_us = client_now_us() + for_us;
     const unsigned signals = signals_count();
-    const struct timespec pause = {0, LOOK_NS};
+    const struct timespec pause = {0, POLL_NS};
     bool there = false;
+    talk_forget();
     talk_keys_begin();
     while (!there && client_now_us() < end_us && !talk_key_pressed() && signals_count() == signals) {
         json_t *status = trial_status(self);
@@ -68,8 +69,8 @@ static bool await_estop(bringup_t *self, const char *wanted, int64_t for_us) {
 }
 
 static void go_without(bringup_t *self) {
-    talk_say("There is NO e-stop line. Only the keyboard, the wheels' own one-second watchdog and their power switch "
-             "stop them. Better: wire a button, name it with --estop LINE, and begin again.");
+    talk_print("There is NO e-stop line. Only the keyboard, the wheels' own one-second watchdog and their power switch "
+               "stop them. Better: wire a button, name it with --estop LINE, and begin again.");
     if (!talk_yes(self, "Continue without an e-stop?", false)) {
         bringup_quit(self);
     }
@@ -79,8 +80,8 @@ static void go_without(bringup_t *self) {
 /// Waits for this edge, and ends bringup without it.
 static void need_edge(bringup_t *self, const char *wanted, const char *edge, const char *also) {
     if (!await_estop(self, wanted, PRESS_US)) {
-        talk_say("No %s was seen on %s. Check its wire, %s[estop] active; then begin again.", edge,
-                 self->config.estop.line, also);
+        talk_print("No %s was seen on %s. Check its wire, %s[estop] active; then begin again.", edge,
+                   self->config.estop.line, also);
         bringup_fail(self);
     }
 }
@@ -94,20 +95,20 @@ void bringup_estop(bringup_t *self) {
     trial_start(self, &self->config);
     // A press counts only if the button was not pressed before.
     if (!await_estop(self, "released", RELEASED_US)) {
-        talk_say(
+        talk_print(
             "The e-stop reads as pressed already. Release it now; if it is not pressed, its wire is cut or [estop] "
             "active has the wrong value ...");
         need_edge(self, "released", "release", "");
     }
-    talk_say("Press the e-stop button now ...");
+    talk_print("Press the e-stop button now ...");
     need_edge(self, "pressed", "press", "[estop] line and ");
-    talk_say("Seen. Release it ...");
+    talk_print("Seen. Release it ...");
     need_edge(self, "released", "release", "");
-    talk_say("Seen. In all later steps this button stops the wheels, and so does any key.");
+    talk_print("Seen. In all later steps this button stops the wheels, and so does any key.");
     bringup_note(self, "estop", "line", NULL, "press and release were seen%s",
                  (strncmp(self->config.estop.line, "unix:", 5U) == 0) ? " (a SIMULATED button)" : "");
     bringup_store_wiring(self);
-    if (!trial_wait_ready(self)) {
+    if (!trial_wait_ready(self, false)) {
         bringup_fail(self);
     }
 }

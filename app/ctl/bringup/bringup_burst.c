@@ -47,7 +47,7 @@ static json_t *compose(const burst_t *burst) {
     return request;
 }
 
-static bool is_told(const json_t *wheel, const char *field, int wanted) {
+static bool is_applied(const json_t *wheel, const char *field, int wanted) {
     const json_t *value = json_object_get(wheel, field);
     return json_is_integer(value) && json_integer_value(value) == wanted;
 }
@@ -55,8 +55,8 @@ static bool is_told(const json_t *wheel, const char *field, int wanted) {
 static bool is_in_force(const burst_t *burst, const json_t *state) {
     for (unsigned side = 0; side < IW_SIDES; side++) {
         const json_t *wheel = json_object_get(state, text_side(side));
-        if (!is_told(wheel, "applied_mm_s", burst->speed_mm_s[side]) ||
-            (burst->has_current && !is_told(wheel, "applied_mA", burst->current_mA[side]))) {
+        if (!is_applied(wheel, "applied_mm_s", burst->speed_mm_s[side]) ||
+            (burst->has_current && !is_applied(wheel, "applied_mA", burst->current_mA[side]))) {
             return false;
         }
     }
@@ -201,16 +201,40 @@ static burst_end_t judge(run_t *run, burst_end_t end) {
     return end;
 }
 
-/// Stops immediately after a key or a signal, otherwise with a ramp. Then waits until both wheels are at standstill.
-static void stop(run_t *run, burst_end_t end) {
+/// Returns how the operator ended the burst, by a key or a signal; NULL: neither.
+static const char *ended_by_operator(const run_t *run) {
+    client_t *client = &run->bringup->ctl->client;
+    if (signals_count() != client->seen_signals) {
+        client->seen_signals = signals_count();
+        return "interrupted";
+    }
+    return talk_key_pressed() ? "a key was pressed" : NULL;
+}
+
+static void ask_estop(ctl_t *ctl) {
+    json_decref(near_ask(ctl, json_pack("{s:s,s:s}", "cmd", "estop", "reason", "a key in bringup")));
+}
+
+/// Stops immediately after a key or a signal, otherwise with a ramp. Then waits until both wheels are at standstill; a
+/// key or a signal stops them immediately here too. Returns the end of the burst.
+static burst_end_t stop(run_t *run, burst_end_t end) {
     ctl_t *ctl = run->bringup->ctl;
     const int64_t rest_us = client_now_us() + REST_US;
-    json_t *request = (end == BURST_ABORTED) ? json_pack("{s:s,s:s}", "cmd", "estop", "reason", "a key in bringup")
-                                             : json_pack("{s:s}", "cmd", "stop");
-    json_decref(near_ask(ctl, request));
+    bool latched = end == BURST_ABORTED;
+    if (latched) {
+        ask_estop(ctl);
+    } else {
+        json_decref(near_ask(ctl, json_pack("{s:s}", "cmd", "stop")));
+    }
     json_decref(near_ask(ctl, json_pack("{s:s,s:[]}", "cmd", "watch", "topics")));
     for (bool resting = false; !resting && client_now_us() < rest_us;) {
         json_t *line = NULL;
+        const char *why = ended_by_operator(run);
+        if (!latched && why != NULL) {
+            latched = true;
+            ask_estop(ctl);
+            end = (end == BURST_DONE) ? fail(run, BURST_ABORTED, why) : end;
+        }
         json_t *status = trial_status(run->bringup);
         resting = json_is_true(json_object_get(json_object_get(status, "left"), "at_rest")) &&
                   json_is_true(json_object_get(json_object_get(status, "right"), "at_rest"));
@@ -218,6 +242,7 @@ static void stop(run_t *run, burst_end_t end) {
         (void)client_receive(&ctl->client, client_now_us() + SPACING_US, &line);
         json_decref(line);
     }
+    return end;
 }
 
 /// Arms, and returns the reply; NULL if the wheels are not ready. It tries again because a wheel with late telemetry
@@ -230,7 +255,7 @@ static json_t *arm(bringup_t *self) {
         if (strcmp(text_word(armed, "error"), "not_at_rest") != 0) {
             break;
         }
-        if (!trial_wait_ready(self)) {
+        if (!trial_wait_ready(self, true)) {
             json_decref(armed);
             return NULL;
         }
@@ -238,12 +263,21 @@ static json_t *arm(bringup_t *self) {
     return armed;
 }
 
+/// Ends the burst before the first command. `reply` is the gateway's refusal; NULL: there is none.
+static burst_end_t refuse(run_t *run, const json_t *reply) {
+    const char *why = ended_by_operator(run);
+    if (why == NULL) {
+        why = (reply != NULL) ? text_word(reply, "message") : "the wheels are not ready";
+    }
+    return fail(run, BURST_REFUSED, why);
+}
+
 /// Arms, drives, stops and waits until both are at standstill. Any key stops immediately.
 static void burst_run(bringup_t *self, const burst_t *burst, outcome_t *out_outcome) {
     run_t run = {.bringup = self, .burst = burst, .outcome = out_outcome};
     memset(out_outcome, 0, sizeof(*out_outcome));
-    if (!trial_wait_ready(self)) {
-        out_outcome->end = fail(&run, BURST_REFUSED, "the wheels are not ready");
+    if (!trial_wait_ready(self, true)) {
+        out_outcome->end = refuse(&run, NULL);
         return;
     }
     json_t *why = near_ask(self->ctl, json_pack("{s:s}", "cmd", "why"));
@@ -252,19 +286,15 @@ static void burst_run(bringup_t *self, const burst_t *burst, outcome_t *out_outc
     json_decref(near_ask(self->ctl, json_pack("{s:s,s:[s],s:i}", "cmd", "watch", "topics", "state", "rate_hz", 50)));
     json_t *armed = arm(self);
     if (!json_is_true(json_object_get(armed, "ok"))) {
-        out_outcome->end =
-            fail(&run, BURST_REFUSED, (armed != NULL) ? text_word(armed, "message") : "the wheels are not ready");
+        out_outcome->end = refuse(&run, armed);
         json_decref(armed);
         return;
     }
     json_decref(armed);
-    talk_keys_begin();
     run.begin_us = client_now_us();
     run.received_us = run.begin_us;
     run.end_us = run.begin_us + (int64_t)burst->for_ms * 1000;
-    const burst_end_t end = drive(&run);
-    stop(&run, end);
-    talk_keys_end();
+    const burst_end_t end = stop(&run, drive(&run));
     out_outcome->end = judge(&run, end);
     for (unsigned side = 0; side < IW_SIDES; side++) {
         out_outcome->mean_mm_s[side] =
@@ -274,15 +304,18 @@ static void burst_run(bringup_t *self, const burst_t *burst, outcome_t *out_outc
 
 bool burst_show(bringup_t *self, const burst_t *burst, outcome_t *out_outcome) {
     do {
+        talk_keys_begin(); // Before the sentence: from now on any key stops it.
         (void)fputs("  ... now; any key stops it\n", stdout);
         (void)fflush(stdout);
         burst_run(self, burst, out_outcome);
+        talk_keys_end();
         if (out_outcome->end == BURST_DONE) {
-            talk_say("  left %d mm/s, right %d mm/s measured", out_outcome->mean_mm_s[IW_LEFT],
-                     out_outcome->mean_mm_s[IW_RIGHT]);
+            talk_print("  left %d mm/s, right %d mm/s measured", out_outcome->mean_mm_s[IW_LEFT],
+                       out_outcome->mean_mm_s[IW_RIGHT]);
             return true;
         }
-        talk_say("  %s: %s", (out_outcome->end == BURST_REFUSED) ? "It did not begin" : "STOPPED", out_outcome->why);
+        talk_print("  %s: %s", (out_outcome->end == BURST_REFUSED) ? "The movement did not start" : "STOPPED",
+                   out_outcome->why);
     } while (talk_yes(self, "Try again?", false));
     return false;
 }

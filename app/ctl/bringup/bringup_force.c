@@ -9,7 +9,7 @@
 #include <string.h>
 #include <time.h>
 
-#define LOOK_NS     50000000L
+#define POLL_NS     50000000L
 #define SAMPLES     40
 #define SETTLE_NS   300000000L // Time until the force frames show a new load.
 #define G_N_PER_kg  9.8        // Value in the document.
@@ -33,9 +33,9 @@ typedef struct {
 } force_t;
 
 /// Measures the raw force. Ends bringup after a signal.
-static force_t look_at_force(bringup_t *self, iw_side_t side) {
+static force_t read_force(bringup_t *self, iw_side_t side) {
     const unsigned signals = signals_count();
-    const struct timespec pause = {0, LOOK_NS};
+    const struct timespec pause = {0, POLL_NS};
     const struct timespec settle = {0, SETTLE_NS};
     force_t force = {.low = INT16_MAX, .high = INT16_MIN};
     double sum = 0.0;
@@ -88,37 +88,37 @@ static void keep_unit(bringup_t *self, iw_side_t side, double counts, double mas
     const char *word = cn ? "cN" : "dN";
     const iw_force_unit_t before = self->config.core.force_unit[side];
     if (!cn && !dn) {
-        talk_say("  %.1f counts per newton fit neither cN (100) nor dN (10): the unit stays assumed. Was the whole "
-                 "mass on this handle?",
-                 per_N);
+        talk_print("  %.1f counts per newton fit neither cN (100) nor dN (10): the unit stays assumed. Was the whole "
+                   "mass on this handle?",
+                   per_N);
         bringup_note(self, text_side(side), "force_unit", NULL, "assumed: %.1f counts per N fit neither cN nor dN",
                      per_N);
         return;
     }
     self->config.core.force_unit[side] = cn ? IW_FORCE_CN : IW_FORCE_DN;
-    talk_say("  %.0f counts for %.1f N: the unit is %s%s.%s", fabs(counts), mass_kg * G_N_PER_kg, word,
-             (self->config.core.force_unit[side] == before) ? "" : ", which is not the configured one",
-             (counts < 0.0) ? " The force counts downwards: pressing is negative." : "");
+    talk_print("  %.0f counts for %.1f N: the unit is %s%s.%s", fabs(counts), mass_kg * G_N_PER_kg, word,
+               (self->config.core.force_unit[side] == before) ? "" : ", which is not the configured one",
+               (counts < 0.0) ? " The force counts downwards: pressing is negative." : "");
     bringup_note(self, text_side(side), "force_unit", (side == IW_LEFT) ? "force_unit_left" : "force_unit_right",
                  "%.2f kg changed the raw force by %.0f counts%s", mass_kg, counts,
                  (counts < 0.0) ? "; pressing makes it smaller" : "");
 }
 
 /// Reports a measurement without a mass: only whether the handle belongs to this wheel, and its direction of counting.
-static void tell_press(bringup_t *self, iw_side_t side, double counts) {
+static void report_press(bringup_t *self, iw_side_t side, double counts) {
     if (fabs(counts) < COUNTS_MIN) {
-        talk_say("  Nothing changed on the %s wheel. Is this its handle?", text_side(side));
+        talk_print("  Nothing changed on the %s wheel. Is this its handle?", text_side(side));
         bringup_note(self, text_side(side), "force_unit", NULL, "assumed: pressing the handle changed nothing");
         return;
     }
-    talk_say("  Pressing changed the raw force by %.0f counts. The unit stays assumed: only a known mass shows it.",
-             counts);
+    talk_print("  Pressing changed the raw force by %.0f counts. The unit stays assumed: only a known mass shows it.",
+               counts);
     bringup_note(self, text_side(side), "force_unit", NULL, "assumed; pressing changed the raw force by %.0f counts",
                  counts);
 }
 
-static void tell_deaf(bringup_t *self, iw_side_t side) {
-    talk_say("  Force frames of the %s wheel were missing; its unit stays assumed.", text_side(side));
+static void report_deaf(bringup_t *self, iw_side_t side) {
+    talk_print("  Force frames of the %s wheel were missing; its unit stays assumed.", text_side(side));
     bringup_note(self, text_side(side), "force_unit", NULL, "assumed: force frames were missing");
 }
 
@@ -126,16 +126,16 @@ static void tell_deaf(bringup_t *self, iw_side_t side) {
 /// the reason.
 static bool is_usable(bringup_t *self, iw_side_t side, const force_t *free, const force_t *loaded) {
     if (is_at_its_end(free) || is_at_its_end(loaded)) {
-        talk_say("  The raw force is at the end of its range (%lld to %lld); the unit stays assumed. Use less mass.",
-                 loaded->low, loaded->high);
+        talk_print("  The raw force is at the end of its range (%lld to %lld); the unit stays assumed. Use less mass.",
+                   loaded->low, loaded->high);
         bringup_note(self, text_side(side), "force_unit", NULL, "assumed: the force was at the end of its range");
         return false;
     }
     const double change = loaded->mean - free->mean;
     if (!is_steady(free, change) || !is_steady(loaded, change)) {
-        talk_say("  The force swayed (free %lld to %lld, loaded %lld to %lld): was the handle or the mass touched "
-                 "meanwhile? The unit stays assumed.",
-                 free->low, free->high, loaded->low, loaded->high);
+        talk_print("  The force swayed (free %lld to %lld, loaded %lld to %lld): was the handle or the mass touched "
+                   "meanwhile? The unit stays assumed.",
+                   free->low, free->high, loaded->low, loaded->high);
         bringup_note(self, text_side(side), "force_unit", NULL, "assumed: the force swayed while it was weighed");
         return false;
     }
@@ -150,20 +150,20 @@ static bool measure(bringup_t *self, iw_side_t side) {
     (void)snprintf(question, sizeof question, "Mass in kg that you will put on the %s handle (Enter: press by hand)",
                    text_side(side));
     const bool weighed = talk_number(self, question, MASS_MIN_kg, MASS_MAX_kg, &mass_kg);
-    talk_ask(self, "Hands and weights off both handles, then Enter", "go", answer);
-    const force_t free = look_at_force(self, side);
+    talk_ask(self, "Remove hands and weights from both handles, then press Enter", "go", answer);
+    const force_t free = read_force(self, side);
     if (!free.heard) {
-        tell_deaf(self, side);
+        report_deaf(self, side);
         return false;
     }
-    (void)snprintf(question, sizeof question, "Now %s the %s handle and leave it so, then Enter",
+    (void)snprintf(question, sizeof question, "Now %s the %s handle, and press Enter while the load stays there",
                    weighed ? "put the mass on" : "press", text_side(side));
     talk_ask(self, question, "go", answer);
-    const force_t loaded = look_at_force(self, side);
+    const force_t loaded = read_force(self, side);
     if (!loaded.heard) {
-        tell_deaf(self, side);
+        report_deaf(self, side);
     } else if (!weighed) {
-        tell_press(self, side, loaded.mean - free.mean);
+        report_press(self, side, loaded.mean - free.mean);
     } else if (is_usable(self, side, &free, &loaded)) {
         keep_unit(self, side, loaded.mean - free.mean, mass_kg);
     } else {
@@ -174,9 +174,10 @@ static bool measure(bringup_t *self, iw_side_t side) {
 
 void bringup_force(bringup_t *self) {
     talk_step(7, "the force (nothing turns)");
-    talk_say("In the document the unit is cN for the left and dN for the right handle, a factor of ten. A known mass "
-             "(a bag of %.1f kg or more) shows the right one.",
-             MASS_MIN_kg);
+    talk_print(
+        "The wheels' document states cN for the left handle and dN for the right one, ten times as much. A known "
+        "mass (a bag of %.1f kg or more) shows the real unit.",
+        MASS_MIN_kg);
     trial_start(self, &self->config);
     const bool wanted = talk_yes(self, "Measure the force?", true);
     for (unsigned side = 0; side < IW_SIDES && wanted;) {

@@ -30,15 +30,15 @@ static bool is_no_turn(const hand_t *hand, iw_side_t side, const turned_t *turne
         return true;
     }
     if (hand->way[other] > hand->way[side]) {
-        talk_say("  The %s wheel counted %lld ticks and the %s one %lld: was the wrong one turned, or are they "
-                 "exchanged?",
-                 text_side(other), hand->ticks[other], name, hand->ticks[side]);
+        talk_print("  The %s wheel counted %lld ticks and the %s one %lld: was the wrong one turned, or are they "
+                   "exchanged?",
+                   text_side(other), hand->ticks[other], name, hand->ticks[side]);
     } else if (!hand_went_one_way(hand, side)) {
-        talk_say("  The %s wheel was turned back and forth: %lld ticks forwards, %lld in all.", name, hand->ticks[side],
-                 hand->way[side]);
+        talk_print("  The %s wheel was turned back and forth: %lld ticks forwards, %lld in all.", name,
+                   hand->ticks[side], hand->way[side]);
     } else if (turned->gear < 1.0 - GEAR_PERCENT / 100.0 || turned->gear > GEAR_MAX) {
-        talk_say("  %lld ticks of the %s wheel in %d turns are no gear between 1 and %.0f.", hand->ticks[side], name,
-                 TURNS, GEAR_MAX);
+        talk_print("  %lld ticks of the %s wheel in %d turns fit no gear ratio from 1 to %.0f.", hand->ticks[side],
+                   name, TURNS, GEAR_MAX);
     } else {
         return false;
     }
@@ -102,7 +102,7 @@ static void judge_gear(bringup_t *self, const turned_t turned[IW_SIDES]) {
     const double gear = (turned[IW_LEFT].gear + turned[IW_RIGHT].gear) / 2.0;
     iw_config_t core = self->config.core;
     if (fabs(turned[IW_LEFT].gear - turned[IW_RIGHT].gear) > gear * 2.0 * GEAR_PERCENT / 100.0) {
-        talk_say(
+        talk_print(
             "  The left rotor makes %.2f turns per turn of its wheel, the right one %.2f: were both turned exactly "
             "%d times? The gear is unchanged.",
             turned[IW_LEFT].gear, turned[IW_RIGHT].gear, TURNS);
@@ -113,12 +113,12 @@ static void judge_gear(bringup_t *self, const turned_t turned[IW_SIDES]) {
     const rpm_of_t rpm = judge_rpm(turned);
     // Without a gear the rpm of wheel and rotor are the same.
     core.rpm_of_rotor = geared && ((rpm == RPM_UNSEEN) ? core.rpm_of_rotor : rpm == RPM_ROTOR);
-    talk_say("  %lld and %lld ticks in %d turns: %.2f turns of the rotor per turn of the wheel; %s.",
-             turned[IW_LEFT].ticks, turned[IW_RIGHT].ticks, TURNS, gear,
-             !geared               ? "no gear: rotor and wheel turn together"
-             : (rpm == RPM_UNSEEN) ? "whether rpm counts the wheel or the rotor was not measured (turn faster)"
-             : (rpm == RPM_ROTOR)  ? "rpm counts the rotor's turns"
-                                   : "rpm counts the wheel's turns");
+    talk_print("  %lld and %lld ticks in %d turns: %.2f turns of the rotor per turn of the wheel; %s.",
+               turned[IW_LEFT].ticks, turned[IW_RIGHT].ticks, TURNS, gear,
+               !geared               ? "no gear: rotor and wheel turn together"
+               : (rpm == RPM_UNSEEN) ? "whether rpm counts the wheel or the rotor was not measured (turn faster)"
+               : (rpm == RPM_ROTOR)  ? "rpm counts the rotor's turns"
+                                     : "rpm counts the wheel's turns");
     if (talk_yes(self, "Use that?", true)) {
         self->config.core = core;
         bringup_fit_rest(&self->config.core);
@@ -129,9 +129,9 @@ static void judge_gear(bringup_t *self, const turned_t turned[IW_SIDES]) {
 void bringup_gear(bringup_t *self) {
     turned_t turned[IW_SIDES];
     talk_step(3, "the gear (nothing is sent; you turn)");
-    talk_say("The wheels count %u ticks per turn of the rotor. The document does not state whether the rotor turns "
-             "faster than the wheel. Mark each tyre, so that you see a full turn.",
-             IW_TICKS_PER_TURN);
+    talk_print("The wheels count %u ticks per turn of the rotor. The document does not state whether the rotor turns "
+               "faster than the wheel. Mark each tyre, so that you see a full turn.",
+               IW_TICKS_PER_TURN);
     if (!talk_yes(self, "Turn the wheels by hand?", true)) {
         return;
     }
@@ -139,6 +139,6 @@ void bringup_gear(bringup_t *self) {
     if (turn(self, IW_LEFT, &turned[IW_LEFT]) && turn(self, IW_RIGHT, &turned[IW_RIGHT])) {
         judge_gear(self, turned);
     } else {
-        talk_say("  The gear is unchanged.");
+        talk_print("  The gear is unchanged.");
     }
 }

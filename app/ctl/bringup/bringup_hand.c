@@ -7,15 +7,15 @@
 #include <time.h>
 #include <unistd.h>
 
-#define LOOK_NS 20000000L
+#define POLL_NS 20000000L
 
 static void nap(void) {
-    const struct timespec pause = {0, LOOK_NS};
+    const struct timespec pause = {0, POLL_NS};
     (void)nanosleep(&pause, NULL);
 }
 
-static hand_look_t look(bringup_t *self) {
-    hand_look_t seen = {.heard = true};
+static hand_sample_t read_hand(bringup_t *self) {
+    hand_sample_t seen = {.heard = true};
     json_t *status = trial_status(self);
     for (unsigned side = 0; side < IW_SIDES; side++) {
         const json_t *wheel = json_object_get(status, text_side(side));
@@ -31,11 +31,11 @@ static hand_look_t look(bringup_t *self) {
 }
 
 /// Polls until both wheels are online, for HAND_OFFLINE_US at most. Returns the last answer.
-static hand_look_t first_look(bringup_t *self) {
-    hand_look_t seen = look(self);
-    for (unsigned i = 0; i < HAND_OFFLINE_US / (LOOK_NS / 1000L) && !seen.heard; i++) {
+static hand_sample_t read_first(bringup_t *self) {
+    hand_sample_t seen = read_hand(self);
+    for (unsigned i = 0; i < HAND_OFFLINE_US / (POLL_NS / 1000L) && !seen.heard; i++) {
         nap();
-        seen = look(self);
+        seen = read_hand(self);
     }
     return seen;
 }
@@ -43,12 +43,12 @@ static hand_look_t first_look(bringup_t *self) {
 /// Waits for a line or the end of input, and until everything is counted up to it. Returns false on a signal.
 static bool wait_for_line(bringup_t *self, hand_t *hand) {
     const unsigned before = signals_count();
-    const struct timespec pause = {0, LOOK_NS};
+    const struct timespec pause = {0, POLL_NS};
     struct pollfd input = {.fd = STDIN_FILENO, .events = POLLIN};
     bool counted = false;
     while (!counted && signals_count() == before) {
         const int ready = ppoll(&input, 1, &pause, signals_let_in());
-        const hand_look_t now = look(self);
+        const hand_sample_t now = read_hand(self);
         hand_add(hand, &now, client_now_us());
         if (ready > 0 && !now.heard) {
             nap();
@@ -60,10 +60,10 @@ static bool wait_for_line(bringup_t *self, hand_t *hand) {
 
 void hand_follow(bringup_t *self, const char *prompt, hand_t *out_hand) {
     char line[16] = "";
-    if (!trial_wait_ready(self)) {
+    if (!trial_wait_ready(self, false)) {
         bringup_fail(self);
     }
-    const hand_look_t first = first_look(self);
+    const hand_sample_t first = read_first(self);
     hand_begin(out_hand, &first, client_now_us());
     talk_forget();
     (void)printf("%s ", prompt);

@@ -25,15 +25,15 @@ static bool counts_forwards(const bringup_t *self, const hand_t *hand) {
     for (unsigned side = 0; side < IW_SIDES; side++) {
         const bool forwards = (hand->ticks[side] > 0) != self->config.core.invert[side];
         if (!forwards) {
-            talk_say(
+            talk_print(
                 "  The %s wheel counted backwards while the machine moved forwards. Either it was pushed backwards, "
                 "or the sign of step 6 is wrong: begin again if you are not sure.",
                 text_side(side));
             return false;
         }
         if (!hand_went_one_way(hand, (iw_side_t)side)) {
-            talk_say("  The %s wheel moved back and forth: %lld ticks forwards, %lld in all. Please push again.",
-                     text_side(side), llabs(hand->ticks[side]), hand->way[side]);
+            talk_print("  The %s wheel moved back and forth: %lld ticks forwards, %lld in all. Please push again.",
+                       text_side(side), llabs(hand->ticks[side]), hand->way[side]);
             return false;
         }
     }
@@ -45,8 +45,8 @@ static bool is_usable(const bringup_t *self, const hand_t *hand) {
         return false;
     }
     if (llabs(hand->ticks[IW_LEFT]) < TICKS_MIN || llabs(hand->ticks[IW_RIGHT]) < TICKS_MIN) {
-        talk_say("  Too few ticks (left %lld, right %lld): push further, both wheels on the ground.",
-                 hand->ticks[IW_LEFT], hand->ticks[IW_RIGHT]);
+        talk_print("  Too few ticks (left %lld, right %lld): push further, both wheels on the ground.",
+                   hand->ticks[IW_LEFT], hand->ticks[IW_RIGHT]);
         return false;
     }
     return counts_forwards(self, hand);
@@ -75,15 +75,15 @@ static bool judge_radius(bringup_t *self, const hand_t *hand, double distance_m)
     if (!is_usable(self, hand)) {
         return false;
     }
-    talk_say("  Left %.1f mm, right %.1f mm; mean %.0f mm%s.", left, right, mean,
-             bringup_is_confirmed(self, "gear_ratio") ? "" : ", if the gear is as configured: it was not measured");
+    talk_print("  Left %.1f mm, right %.1f mm; mean %.0f mm%s.", left, right, mean,
+               bringup_is_confirmed(self, "gear_ratio") ? "" : ", if the gear is as configured: it was not measured");
     if (!straight) {
-        talk_say(
-            "  They differ by more than %.0f %%: it was a curve, or the tyres differ. Better push again, straight.",
-            ALIKE_PERCENT);
+        talk_print("  They differ by more than %.0f %%: it was a curve, or the tyres differ. Push it again, straight.",
+                   ALIKE_PERCENT);
     }
     if (mean < range.min || mean > range.max) {
-        talk_say("  That is no radius between %u and %u mm: was the distance in metres?", range.min, range.max);
+        talk_print("  The radius would be outside %u to %u mm: did you type the distance in metres?", range.min,
+                   range.max);
         return false;
     }
     const bool accepted = talk_yes(self, "Use the mean?", straight);
@@ -98,7 +98,7 @@ void bringup_radius(bringup_t *self) {
     double distance_m = 0.0;
     hand_t hand;
     talk_step(8, "the radius (nothing is sent; you push)");
-    talk_say(
+    talk_print(
         "In the document it is approximately 192 mm. Put the machine on the ground, mark a straight distance of 3 m "
         "or more, and push the machine along it with its wheels rolling.");
     trial_start(self, &self->config);
@@ -106,7 +106,7 @@ void bringup_radius(bringup_t *self) {
         if (!talk_number(self, "Distance in m (Enter: skip this step)", DISTANCE_MIN, DISTANCE_MAX, &distance_m)) {
             return;
         }
-        talk_ask(self, "Stand at the start, then Enter", "go", answer);
+        talk_ask(self, "Place the machine at the start mark, then press Enter", "go", answer);
         hand_follow(self, "Push it forwards to the end mark, let it stop, then press Enter ...", &hand);
     } while (!judge_radius(self, &hand, distance_m));
 }

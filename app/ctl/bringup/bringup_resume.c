@@ -93,7 +93,7 @@ void bringup_read_saved(bringup_t *self, const char *path) {
     }
     const uint32_t stored = (uint32_t)strtoul(mark + strlen(MARK), NULL, 16);
     if (stored != iwn_line_crc(0, text, (size_t)(mark - text))) {
-        talk_say("%s was changed after bringup had saved it: its results do not count as confirmed.", path);
+        talk_print("%s was changed after bringup had saved it: its results do not count as confirmed.", path);
         return;
     }
     *mark = '\0';
@@ -104,9 +104,9 @@ void bringup_resume(bringup_t *self) {
     if (self->notes == 0U) {
         return;
     }
-    talk_say("The file of --from has %u confirmed results of an earlier bringup. They are right only for the same "
-             "wheels, mounted in the same way.",
-             self->notes);
+    talk_print("The file of --from has %u confirmed results of an earlier bringup. They are right only for the same "
+               "wheels, mounted in the same way.",
+               self->notes);
     if (!talk_yes(self, "The same wheels, mounted in the same way?", false)) {
         self->notes = 0;
     }

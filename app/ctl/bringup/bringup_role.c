@@ -52,9 +52,9 @@ static void find_setpoint(role_t *found, unsigned sides, int current_mA) {
     found->seen = sides == BOTH;
     (void)snprintf(found->how, sizeof found->how, "%d mA without speed turned %s", current_mA, wheels(sides));
     if (!found->seen) {
-        talk_say(
-            "Only %s: the other one may be held. A current that turns a wheel without a speed is no limit, but only "
-            "one wheel showed it.",
+        talk_print(
+            "Only %s turned: the other one may be blocked. A current that turns a wheel without a speed is no limit, "
+            "but only one wheel showed it.",
             wheels(sides));
     }
 }
@@ -65,7 +65,7 @@ static unsigned try_zero(bringup_t *self) {
     gateway_config_t config = self->config;
     const burst_t zero = {.for_ms = ZERO_MS, .enough_mm_s = TORQUE_MM_S};
     config.core.current_role = IW_ROLE_LIMIT;
-    talk_say("Now a zero of that role, speed 0 with %d mA. Neither wheel may turn.", self->current_mA);
+    talk_print("Now speed 0 with %d mA, the zero of the role limit. Neither wheel may turn.", self->current_mA);
     trial_start(self, &config);
     return try_burst(self, &zero);
 }
@@ -76,24 +76,24 @@ static void try_limit(bringup_t *self, role_t *found) {
     const burst_t together = bringup_ahead(self, BRINGUP_PROBE_MS / 2U);
     unsigned sides = try_zero(self);
     if (sides != 0U) {
-        talk_say("It TURNED %s: the current is a setpoint after all.", wheels(sides));
+        talk_print("It TURNED %s: the current is a setpoint after all.", wheels(sides));
         find_setpoint(found, sides, self->current_mA);
         return;
     }
-    talk_say("Neither wheel turned. Last, speed and current together: unless both wheels turn, there is no result.");
+    talk_print("Neither wheel turned. Finally speed and current together; the result counts only if both wheels turn.");
     bringup_start_with(self, self->config.core.setpoint_type);
     sides = try_burst(self, &together);
     found->seen = sides == BOTH;
     if (found->seen) {
         found->role = "limit";
         (void)snprintf(found->how, sizeof found->how,
-                       "%d mA alone and %d mm/s alone turned no wheel, both together did", self->current_mA,
+                       "%d mA alone and %d mm/s alone turned no wheel, both together turned both", self->current_mA,
                        BRINGUP_SPEED_MM_S);
-        talk_say("The wheels turn with both together, and with neither alone: the current is a limit.");
+        talk_print("The wheels turn with both together, and with neither alone: the current is a limit.");
     } else {
-        talk_say(
-            "Now %s turned: something holds the wheels, so the tries before have no result. Let them turn freely and "
-            "begin again, or answer from other information.",
+        talk_print(
+            "Now %s turned, so a wheel was blocked and the earlier tries have no result. Free the wheels and start "
+            "bringup again, or answer from other information.",
             wheels(sides));
     }
 }
@@ -107,15 +107,15 @@ static void find_role(bringup_t *self, role_t *found) {
     const unsigned by_current = try_burst(self, &current_only);
     const unsigned by_speed = try_burst(self, &speed_only);
     if (by_current != 0U) {
-        talk_say("The current alone turned %s: it is a setpoint.", wheels(by_current));
+        talk_print("The current alone turned %s: it is a setpoint.", wheels(by_current));
         find_setpoint(found, by_current, current_mA);
     } else if (by_speed != 0U) {
-        talk_say(
-            "The speed without current turned %s, the current alone none: the current seems to have no effect. Ask the "
-            "maker; limit is the usual role then.",
+        talk_print(
+            "The speed without current turned %s, and the current alone turned none: the current seems to have no "
+            "effect. Ask the maker; in this case the usual role is limit.",
             wheels(by_speed));
     } else {
-        talk_say("Neither alone turned a wheel: the current may be a limit.");
+        talk_print("Neither alone turned a wheel: the current may be a limit.");
         try_limit(self, found);
     }
 }
@@ -124,19 +124,19 @@ static void keep_role(bringup_t *self, const role_t *found) {
     char answer[BRINGUP_ANSWER_SIZE];
     talk_ask(self, "current_role (limit or setpoint)", found->role, answer);
     while (strcmp(answer, "limit") != 0 && strcmp(answer, "setpoint") != 0) {
-        talk_say("Please write limit or setpoint: without one of them the wheels cannot be driven (q ends bringup).");
+        talk_print("Please write limit or setpoint: without one of them the wheels cannot be driven (q ends bringup).");
         talk_ask(self, "current_role (limit or setpoint)", found->role, answer);
     }
     const bool same = strcmp(answer, found->role) == 0;
     self->config.core.current_role = (strcmp(answer, "limit") == 0) ? IW_ROLE_LIMIT : IW_ROLE_SETPOINT;
     bringup_note(self, "wheels", "current_role", (same && found->seen) ? "current_role" : NULL, "%s",
-                 same ? found->how : "typed in; the wheels did not show it");
+                 same ? found->how : "typed by the operator; the wheels did not show it");
 }
 
 void bringup_role(bringup_t *self) {
     role_t found = {.role = "?"};
     talk_step(5, "the role of the current (WHEELS MAY TURN, in the air)");
-    talk_say(
+    talk_print(
         "A setpoint has a speed and a current. The current is either a limit of the motor's current, or a "
         "setpoint of its own. Two to four short tries show it: first %d mA without a speed, then %d mm/s without a "
         "current.",

@@ -25,27 +25,27 @@ static bool bus_agrees(const bringup_t *self, const outcome_t *outcome, iw_side_
     const int driven = outcome->mean_mm_s[side];
     const int other = outcome->mean_mm_s[(side == IW_LEFT) ? IW_RIGHT : IW_LEFT];
     if (abs(driven) < MOVES_MM_S && abs(other) >= MOVES_MM_S) {
-        talk_say("By the bus the OTHER wheel turned: left and right are exchanged. Their ids are fixed, so "
-                 "exchange the wheels (or their plugs), then begin again.");
+        talk_print("The bus shows that the OTHER wheel turned: left and right are exchanged. Their ids are fixed, so "
+                   "exchange the wheels (or their plugs), then start bringup again.");
         return false;
     }
     if (abs(other) >= MOVES_MM_S) {
-        talk_say(
-            "By the bus BOTH wheels turned (%d and %d mm/s), although only the %s one was commanded. Find out what "
-            "turned the other one: until then no sign can be found.",
+        talk_print(
+            "The bus shows that BOTH wheels turned (%d and %d mm/s), although only the %s one was commanded. Find out "
+            "what turned the other one, then start bringup again.",
             driven, other, text_side(side));
         return false;
     }
     if (driven <= -MOVES_MM_S) {
-        talk_say(
+        talk_print(
             "The %s wheel measures the opposite of its command. No configuration key corrects that, and the gateway "
             "would stop for it (feedback_sign): check the wiring between motor and sensor, or ask the maker.",
             text_side(side));
         return false;
     }
     if (driven < MOVES_MM_S) {
-        talk_say("The %s wheel did not turn. Is it blocked? If it needs more current: --current (now %d mA).",
-                 text_side(side), self->current_mA);
+        talk_print("The %s wheel did not turn. Is it blocked? If it needs more current: --current (now %d mA).",
+                   text_side(side), self->current_mA);
         return false;
     }
     return true;
@@ -62,7 +62,7 @@ static void keep_sign(bringup_t *self, iw_side_t side, bool forward) {
 }
 
 /// Turns one wheel and asks for its direction. Returns false if the wheel must be shown again.
-static bool look_at(bringup_t *self, iw_side_t side) {
+static bool measure_sign(bringup_t *self, iw_side_t side) {
     char answer[BRINGUP_ANSWER_SIZE];
     char question[96];
     outcome_t outcome;
@@ -76,20 +76,21 @@ static bool look_at(bringup_t *self, iw_side_t side) {
         bringup_fail(self);
     }
     for (;;) {
-        talk_ask(self, "It would move the machine f forwards, b backwards (o: other wheel, r: repeat)", "r", answer);
+        talk_ask(self, "Direction of the machine: f forwards, b backwards (o: other wheel, r: repeat)", "r", answer);
         if (strcmp(answer, "r") == 0) {
             return false;
         }
         if (strcmp(answer, "o") == 0) {
-            talk_say("Then left and right are exchanged. Their ids are fixed, so exchange the wheels (or their plugs), "
-                     "then begin again.");
+            talk_print(
+                "Then left and right are exchanged. Their ids are fixed, so exchange the wheels (or their plugs), "
+                "then start bringup again.");
             bringup_fail(self);
         }
         if (strcmp(answer, "f") == 0 || strcmp(answer, "b") == 0) {
             keep_sign(self, side, answer[0] == 'f');
             return true;
         }
-        talk_say("Please write f, b, o or r.");
+        talk_print("Please write f, b, o or r.");
     }
 }
 
@@ -99,12 +100,12 @@ static bool verify(bringup_t *self) {
     outcome_t outcome;
     const burst_t burst = turn(self, BRINGUP_SPEED_MM_S, BRINGUP_SPEED_MM_S);
     trial_start(self, &self->config);
-    talk_ask(self, "Now both. Enter turns them for straight ahead", "go", answer);
+    talk_ask(self, "Now both wheels. Enter turns them for a movement straight ahead", "go", answer);
     burst_insist(self, &burst, &outcome);
     if (outcome.mean_mm_s[IW_LEFT] < MOVES_MM_S || outcome.mean_mm_s[IW_RIGHT] < MOVES_MM_S) {
-        talk_say(
-            "By the bus not both turned forwards. Something held a wheel, or a direction was seen wrongly: each wheel "
-            "again.");
+        talk_print(
+            "The bus shows that a wheel did not turn forwards. It was blocked, or one of your answers was wrong. "
+            "Both wheels are tested again.");
         return false;
     }
     return talk_yes(self, "Would the machine have moved straight ahead?", false);
@@ -112,12 +113,13 @@ static bool verify(bringup_t *self) {
 
 void bringup_signs(bringup_t *self) {
     talk_step(6, "the direction of each wheel (WHEELS TURN, in the air)");
-    talk_say("Stand behind the machine, like its user. Each wheel turns alone and slowly; answer in which direction it "
-             "would have moved the machine on the ground.");
+    talk_print(
+        "Stand behind the machine, like its user. Each wheel turns alone and slowly; answer in which direction it "
+        "would have moved the machine on the ground.");
     do {
         trial_start(self, &self->config);
         for (unsigned side = 0; side < IW_SIDES;) {
-            side += look_at(self, (iw_side_t)side) ? 1U : 0U;
+            side += measure_sign(self, (iw_side_t)side) ? 1U : 0U;
         }
     } while (!verify(self));
 }

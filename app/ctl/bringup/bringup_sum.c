@@ -14,14 +14,14 @@ static void note_gap(hand_t *self, hand_gap_t gap) {
     }
 }
 
-void hand_begin(hand_t *out_hand, const hand_look_t *first, int64_t now_us) {
+void hand_begin(hand_t *out_hand, const hand_sample_t *first, int64_t now_us) {
     *out_hand = (hand_t){
-        .last = *first, .gap = first->heard ? HAND_COMPLETE : HAND_OFFLINE, .heard_us = now_us, .looked_us = now_us};
+        .last = *first, .gap = first->heard ? HAND_COMPLETE : HAND_OFFLINE, .received_us = now_us, .polled_us = now_us};
 }
 
 /// Adds the step between two answers with both wheels. The wheels count during a stall, but their rpm in that time are
 /// not known.
-static void add_step(hand_t *self, const hand_look_t *now, int64_t us) {
+static void add_step(hand_t *self, const hand_sample_t *now, int64_t us) {
     for (unsigned side = 0; side < IW_SIDES; side++) {
         const long long step = now->ticks[side] - self->last.ticks[side];
         self->ticks[side] += step;
@@ -33,9 +33,9 @@ static void add_step(hand_t *self, const hand_look_t *now, int64_t us) {
     }
 }
 
-void hand_add(hand_t *self, const hand_look_t *now, int64_t now_us) {
-    const int64_t us = now_us - self->looked_us;
-    self->looked_us = now_us;
+void hand_add(hand_t *self, const hand_sample_t *now, int64_t now_us) {
+    const int64_t us = now_us - self->polled_us;
+    self->polled_us = now_us;
     if (us > HAND_UNSEEN_US) {
         note_gap(self, HAND_UNSEEN);
     }
@@ -49,25 +49,25 @@ void hand_add(hand_t *self, const hand_look_t *now, int64_t now_us) {
     if (now->reboots != self->last.reboots) {
         note_gap(self, HAND_RESTARTED);
     }
-    add_step(self, now, now_us - self->heard_us);
+    add_step(self, now, now_us - self->received_us);
     self->last = *now;
-    self->heard_us = now_us;
+    self->received_us = now_us;
     self->offline_us = 0;
 }
 
 bool hand_is_complete(const hand_t *hand) {
     switch (hand->gap) {
     case HAND_OFFLINE:
-        talk_say("  The wheels were offline for a while: check their power and cables, then try again.");
+        talk_print("  The wheels were offline for a while: check their power and cables, then try again.");
         break;
     case HAND_RESTARTED:
-        talk_say("  A wheel restarted or left the bus: not all of its ticks were counted. Check its power and cable, "
-                 "then try again.");
+        talk_print("  A wheel restarted or left the bus: not all of its ticks were counted. Check its power and cable, "
+                   "then try again.");
         break;
     case HAND_UNSEEN:
-        talk_say("  This computer was too busy to follow the wheels for %d s: see what else runs on it, then once "
-                 "more.",
-                 HAND_UNSEEN_US / 1000000);
+        talk_print("  This computer was too busy to follow the wheels for %d s: check what else runs on it, then try "
+                   "again.",
+                   HAND_UNSEEN_US / 1000000);
         break;
     case HAND_COMPLETE:
     default:

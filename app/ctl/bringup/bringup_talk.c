@@ -15,7 +15,7 @@
 static struct termios normal_keys;
 static bool keys_are_raw;
 
-void talk_say(const char *format, ...) {
+void talk_print(const char *format, ...) {
     char text[1024];
     va_list arguments;
     va_start(arguments, format);
@@ -33,9 +33,9 @@ void talk_say(const char *format, ...) {
 
 void talk_step(unsigned number, const char *title) {
     const paper_t paper = {.out = stdout, .colour = text_wants_colour(stdout)};
-    paper_say(&paper, TONE_PLAIN, "%s", "");
+    paper_print(&paper, TONE_PLAIN, "%s", "");
     paper_end(&paper);
-    paper_say(&paper, TONE_TITLE, "Step %u of %u: %s", number, BRINGUP_STEPS, title);
+    paper_print(&paper, TONE_TITLE, "Step %u of %u: %s", number, BRINGUP_STEPS, title);
     paper_end(&paper);
 }
 
@@ -104,7 +104,7 @@ bool talk_yes(bringup_t *self, const char *question, bool otherwise) {
         if (yes || strcmp(answer, "n") == 0 || strcmp(answer, "no") == 0) {
             return yes;
         }
-        talk_say("Please write y or n (q ends bringup).");
+        talk_print("Please write y or n (q ends bringup).");
     }
 }
 
@@ -123,7 +123,7 @@ bool talk_number(bringup_t *self, const char *question, double low, double high,
         if (end != answer && *end == '\0' && *out_number >= low && *out_number <= high) {
             return true;
         }
-        talk_say("Please write a number from %g to %g, without its unit.", low, high);
+        talk_print("Please write a number from %g to %g, without its unit.", low, high);
     }
 }
 
@@ -136,12 +136,12 @@ void talk_keys_begin(void) {
     raw.c_lflag &= ~(tcflag_t)(ICANON | ECHO);
     raw.c_cc[VMIN] = 1;
     raw.c_cc[VTIME] = 0;
-    keys_are_raw = tcsetattr(STDIN_FILENO, TCSAFLUSH, &raw) == 0;
+    keys_are_raw = tcsetattr(STDIN_FILENO, TCSANOW, &raw) == 0; // TCSAFLUSH would discard a key that stops the wheels.
 }
 
 void talk_keys_end(void) {
     if (keys_are_raw) {
-        (void)tcsetattr(STDIN_FILENO, TCSAFLUSH, &normal_keys);
+        (void)tcsetattr(STDIN_FILENO, TCSANOW, &normal_keys);
     }
     keys_are_raw = false;
 }

@@ -33,21 +33,21 @@ static bool is_turn(const bringup_t *self, const hand_t *hand) {
         return false;
     }
     if (llabs(hand->ticks[IW_LEFT]) < TICKS_MIN || llabs(hand->ticks[IW_RIGHT]) < TICKS_MIN) {
-        talk_say("  Too few ticks (left %lld, right %lld): both wheels must stand on the ground and roll.",
-                 hand->ticks[IW_LEFT], hand->ticks[IW_RIGHT]);
+        talk_print("  Too few ticks (left %lld, right %lld): both wheels must stand on the ground and roll.",
+                   hand->ticks[IW_LEFT], hand->ticks[IW_RIGHT]);
     } else if ((left > 0.0) == (right > 0.0)) {
-        talk_say(
+        talk_print(
             "  Both wheels rolled in the same direction (left %.2f m, right %.2f m): that was no turn on the spot. "
             "If it was, a sign of step 6 is wrong: begin again.",
             left / 1e3, right / 1e3);
     } else if (!hand_went_one_way(hand, IW_LEFT) || !hand_went_one_way(hand, IW_RIGHT)) {
-        talk_say(
+        talk_print(
             "  It was turned back and forth (left %lld of %lld ticks, right %lld of %lld): turn it in one direction.",
             llabs(hand->ticks[IW_LEFT]), hand->way[IW_LEFT], llabs(hand->ticks[IW_RIGHT]), hand->way[IW_RIGHT]);
     } else if (fabs(left + right) > (fabs(left) + fabs(right)) * WANDER_PERCENT / 100.0) {
-        talk_say("  Left rolled %.2f m, right %.2f m: the machine moved away while it turned. Turn it on the spot, "
-                 "about the middle between its wheels.",
-                 left / 1e3, right / 1e3);
+        talk_print("  Left rolled %.2f m, right %.2f m: the machine moved away while it turned. Turn it on the spot, "
+                   "about the middle between its wheels.",
+                   left / 1e3, right / 1e3);
     } else {
         return true;
     }
@@ -63,14 +63,14 @@ static void keep_track(bringup_t *self, const hand_t *hand, int turns, double tr
 }
 
 /// Reports that the configuration does not confirm the count.
-static void tell_off(const bringup_t *self) {
+static void report_off(const bringup_t *self) {
     char configured[40] = "No track was configured";
     if (self->config.core.track_mm != 0U) {
         (void)snprintf(configured, sizeof configured, "The configured track is %u mm", self->config.core.track_mm);
     }
-    talk_say("  %s. A tape from the middle of one tyre to the middle of the other shows whether the turns were counted "
-             "rightly.",
-             configured);
+    talk_print(
+        "  %s. Check the number of turns: measure with a tape from the middle of one tyre to the middle of the other.",
+        configured);
 }
 
 /// Returns true if the step is done.
@@ -84,16 +84,17 @@ static bool judge_track(bringup_t *self, const hand_t *hand, int turns) {
         return false;
     }
     if (track_mm < TRACK_MIN || track_mm > TRACK_MAX) {
-        talk_say(
-            "  Left rolled %.2f m, right %.2f m in %d turns: that is no track between %d and %d mm. Was the number of "
+        talk_print(
+            "  Left rolled %.2f m, right %.2f m in %d turns: the track would be outside %d to %d mm. Was the number of "
             "turns right?",
             left / 1e3, right / 1e3, turns, TRACK_MIN, TRACK_MAX);
         return false;
     }
-    talk_say("  Left rolled %.2f m, right %.2f m in %d turns: the track is %.0f mm%s.", left / 1e3, right / 1e3, turns,
-             track_mm, (self->mm_per_tick > 0.0) ? "" : ", if the radius is as configured: no distance was measured");
+    talk_print("  Left rolled %.2f m, right %.2f m in %d turns: the track is %.0f mm%s.", left / 1e3, right / 1e3,
+               turns, track_mm,
+               (self->mm_per_tick > 0.0) ? "" : ", if the radius is as configured: no distance was measured");
     if (!near) {
-        tell_off(self);
+        report_off(self);
     }
     const bool accepted = talk_yes(self, "Use that?", near);
     if (accepted) {
@@ -109,14 +110,14 @@ static int ask_turns(bringup_t *self) {
         if (turns == floor(turns)) {
             return (int)turns;
         }
-        talk_say("Please write a number of full turns: 1, 2, 3 ...");
+        talk_print("Please write a number of full turns: 1, 2, 3 ...");
     }
     return 0;
 }
 
-static void tell_left_out(const bringup_t *self) {
+static void report_left_out(const bringup_t *self) {
     if (self->config.core.track_mm == 0U) {
-        talk_say(
+        talk_print(
             "Without a track the gateway refuses arm: set track_mm under [wheels], from the middle of one tyre to the "
             "middle of the other, in mm.");
     }
@@ -128,19 +129,20 @@ void bringup_track(bringup_t *self) {
     int turns = 0;
     hand_t hand;
     talk_step(9, "the track (nothing is sent; you turn the machine)");
-    talk_say("The track is the distance between the two wheels; it determines how far a twist turns the machine. Leave "
-             "the machine on the ground and mark on the floor where it points. You will turn it on the spot, in one "
-             "direction, until it has pointed at the mark that many times.");
+    talk_print(
+        "The track is the distance between the two wheels; it determines how far a twist turns the machine. Leave "
+        "the machine on the ground and mark on the floor where it points. You will turn it on the spot, in one "
+        "direction, until it has pointed at the mark that many times.");
     trial_start(self, &self->config);
     do {
         turns = ask_turns(self);
         if (turns == 0) {
-            tell_left_out(self);
+            report_left_out(self);
             return;
         }
         (void)snprintf(prompt, sizeof prompt, "Turn it %d full turn%s, stop it at the mark, then press Enter ...",
                        turns, (turns == 1) ? "" : "s");
-        talk_ask(self, "Point it at the mark, then Enter", "go", answer);
+        talk_ask(self, "Point the machine at the mark, then press Enter", "go", answer);
         hand_follow(self, prompt, &hand);
     } while (!judge_track(self, &hand, turns));
 }

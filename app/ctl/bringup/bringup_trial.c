@@ -20,10 +20,10 @@
 #define START_US 5000000
 #define READY_US 8000000
 #define END_US   4000000
-#define LOOK_NS  20000000L
+#define POLL_NS  20000000L
 
 static void nap(void) {
-    const struct timespec pause = {0, LOOK_NS};
+    const struct timespec pause = {0, POLL_NS};
     (void)nanosleep(&pause, NULL);
 }
 
@@ -195,7 +195,7 @@ _Noreturn static void become_gateway(const trial_t *trial) {
 }
 
 /// Prints the last line that the gateway wrote.
-static void tell_log(const trial_t *trial) {
+static void report_log(const trial_t *trial) {
     char path[128];
     char line[512];
     char last[512] = "it wrote nothing";
@@ -219,7 +219,7 @@ static bool connect_to(bringup_t *self) {
     path_of(&self->trial, "gateway.sock", path, sizeof path);
     self->ctl->socket = path;
     do {
-        near_look(self->ctl, NULL, &gateway);
+        near_find(self->ctl, NULL, &gateway);
         json_decref(gateway.status);
         if (gateway.result == NEAR_FOUND) {
             break;
@@ -242,7 +242,7 @@ static bool start(bringup_t *self, const gateway_config_t *config, bool with_rec
         become_gateway(trial);
     }
     if (trial->pid < 0 || !connect_to(self)) {
-        tell_log(trial);
+        report_log(trial);
         trial_stop(self);
         return false;
     }
@@ -286,7 +286,7 @@ void trial_close(bringup_t *self) {
     while (waitpid(trial->guard, &status, 0) < 0 && errno == EINTR) {
     }
     if (status != 0) {
-        talk_say("%s could not be removed; remove it by hand.", trial->folder);
+        talk_print("%s could not be removed; remove it by hand.", trial->folder);
     }
     trial->folder[0] = '\0';
 }
@@ -319,10 +319,10 @@ static const char *missing(const json_t *status) {
     return (strcmp(text_word(status, "state"), "listening") == 0) ? NULL : "the gateway does not return to listening";
 }
 
-bool trial_wait_ready(bringup_t *self) {
+bool trial_wait_ready(bringup_t *self, bool key_ends) {
     const int64_t end_us = client_now_us() + READY_US;
     const unsigned signals = signals_count();
-    for (;;) {
+    while (!key_ends || !talk_key_pressed()) {
         json_t *status = trial_status(self);
         const char *what = missing(status);
         const bool latched = strcmp(text_word(status, "state"), "latched") == 0;
@@ -336,10 +336,11 @@ bool trial_wait_ready(bringup_t *self) {
         }
         if (client_now_us() > end_us || lost) {
             if (signals_count() == signals) {
-                talk_say("  Not ready: %s.", what);
+                talk_print("  Not ready: %s.", what);
             }
             return false;
         }
         nap();
     }
+    return false;
 }

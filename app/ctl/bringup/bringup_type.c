@@ -69,10 +69,9 @@ static void keep_type(bringup_t *self, int type, const outcome_t *outcome) {
                  followed ? "" : ", but at another speed", BRINGUP_SPEED_MM_S, outcome->mean_mm_s[IW_LEFT],
                  outcome->mean_mm_s[IW_RIGHT]);
     if (!followed) {
-        talk_say(
-            "Commanded %d mm/s, measured %d and %d: a gear that was not measured, or this type does not mean speed. "
-            "It is used, and noted as not confirmed.",
-            BRINGUP_SPEED_MM_S, outcome->mean_mm_s[IW_LEFT], outcome->mean_mm_s[IW_RIGHT]);
+        talk_print("Commanded %d mm/s, measured %d and %d: the gear is unknown, or this type does not mean speed. "
+                   "Bringup uses the type and notes it as not confirmed.",
+                   BRINGUP_SPEED_MM_S, outcome->mean_mm_s[IW_LEFT], outcome->mean_mm_s[IW_RIGHT]);
     }
 }
 
@@ -88,8 +87,8 @@ static bool try_type(bringup_t *self, int type) {
     if (!both_move(&outcome)) {
         const bool left = abs(outcome.mean_mm_s[IW_LEFT]) >= MOVES_MM_S;
         if (left || abs(outcome.mean_mm_s[IW_RIGHT]) >= MOVES_MM_S) {
-            talk_say("  Only the %s wheel turned: is the other one held, or switched off?",
-                     text_side(left ? IW_LEFT : IW_RIGHT));
+            talk_print("  Only the %s wheel turned: is the other one blocked, or switched off?",
+                       text_side(left ? IW_LEFT : IW_RIGHT));
         }
         return false;
     }
@@ -137,9 +136,9 @@ static bool try_types(bringup_t *self, const bool *wanted) {
             return true;
         }
     }
-    talk_say("None of these moved both wheels. Other types may; or the wheels need more current (--current, now "
-             "%d mA); or they accept no commands at all: is their enable switch on?",
-             self->current_mA);
+    talk_print("None of these moved both wheels. Other types may; or the wheels need more current (--current, now "
+               "%d mA); or they accept no commands at all: is their enable switch on?",
+               self->current_mA);
     return false;
 }
 
@@ -183,10 +182,10 @@ static void take_length(bringup_t *self, const learn_t *learn) {
     if (both && low == high && low > DLC_MIN && low <= DLC_MAX) {
         self->config.core.setpoint_dlc = (uint16_t)low;
         bringup_note(self, "wheels", "setpoint_dlc", NULL, "every setpoint of the recording has %d bytes", low);
-        talk_say("All of them have %d bytes, so the gateway will send as many (setpoint_dlc).", low);
+        talk_print("All of them have %d bytes, so the gateway will send as many (setpoint_dlc).", low);
     } else if (high > DLC_MIN) {
-        talk_say("They have %d to %d bytes, or only one wheel received any: the length stays %u (setpoint_dlc).", low,
-                 high, self->config.core.setpoint_dlc);
+        talk_print("They have %d to %d bytes, or only one wheel received any: the length stays %u (setpoint_dlc).", low,
+                   high, self->config.core.setpoint_dlc);
     }
 }
 
@@ -203,18 +202,18 @@ static void learn_from_recording(bringup_t *self, char *out_types, size_t size) 
         (void)recording_close(&study->recording);
         const uint64_t frames = list_types(&study->learn, out_types, size);
         if (frames > 0U) {
-            talk_say("In %s %" PRIu64
-                     " setpoints have a speed, with type %s. They were sent; that is no proof that the wheels "
-                     "followed (see: iwheelctl learn).",
-                     self->recording, frames, out_types);
+            talk_print("In %s %" PRIu64
+                       " setpoints have a speed, with type %s. They were sent; that is no proof that the wheels "
+                       "followed (see: iwheelctl learn).",
+                       self->recording, frames, out_types);
             if (study->learn.setpoint[IW_LEFT].sent + study->learn.setpoint[IW_RIGHT].sent > 0U) {
-                talk_say(
+                talk_print(
                     "Some are marked as sent by the program that recorded them: if that was this gateway, they only "
                     "repeat its configuration.");
             }
             take_length(self, &study->learn);
         } else {
-            talk_say("%s has no setpoint with a speed, so it suggests no type.", self->recording);
+            talk_print("%s has no setpoint with a speed, so it suggests no type.", self->recording);
         }
     }
     free(study);
@@ -232,16 +231,17 @@ void bringup_type(bringup_t *self) {
     if (self->recording != NULL) {
         learn_from_recording(self, suggestion, sizeof suggestion);
     }
-    talk_say("Byte 0 of every setpoint is a type whose values the wheels' document does not list. Write the type that "
-             "you know (from the maker, or from a recording: --learn FILE), or the types to try, such as 0-7 or 1,4. "
-             "Each is tried for %.1f s at %d mm/s with at most %d mA, until one moves both wheels.",
-             BRINGUP_PROBE_MS / 1e3, BRINGUP_SPEED_MM_S, self->current_mA);
+    talk_print(
+        "Byte 0 of every setpoint is a type whose values the wheels' document does not list. Write the type that "
+        "you know (from the maker, or from a recording: --learn FILE), or the types to try, such as 0-7 or 1,4. "
+        "Each is tried for %.1f s at %d mm/s with at most %d mA, until one moves both wheels.",
+        BRINGUP_PROBE_MS / 1e3, BRINGUP_SPEED_MM_S, self->current_mA);
     while (!found) {
         talk_ask(self, "Setpoint type, or types to try", suggestion, answer);
         if (parse_types(answer, wanted)) {
             found = try_types(self, wanted);
         } else {
-            talk_say("Types are numbers from 0 to %d: 3, 0-7 or 1,4,9-12.", TYPE_MAX);
+            talk_print("Types are numbers from 0 to %d: 3, 0-7 or 1,4,9-12.", TYPE_MAX);
         }
     }
 }

@@ -93,7 +93,7 @@ static bool put_in_place(const char *temporary, const char *path) {
         if (rename(path, old) != 0) {
             return false;
         }
-        talk_say("The old file is now %s.", old);
+        talk_print("The old file is now %s.", old);
     }
     return rename(temporary, path) == 0;
 }
@@ -104,7 +104,7 @@ static bool write_text(const char *path, const char *text, size_t length, bool s
     (void)snprintf(temporary, sizeof temporary, "%.500s.new", path);
     FILE *file = fopen(temporary, "we");
     if (file == NULL) {
-        talk_say("Cannot write %s: %s. Choose another file.", temporary, strerror(errno));
+        talk_print("Cannot write %s: %s. Choose another file.", temporary, strerror(errno));
         return false;
     }
     (void)fwrite(text, 1, length, file);
@@ -113,7 +113,7 @@ static bool write_text(const char *path, const char *text, size_t length, bool s
     }
     const bool written = fflush(file) == 0 && ferror(file) == 0 && fsync(fileno(file)) == 0;
     if (fclose(file) != 0 || !written || !put_in_place(temporary, path)) {
-        talk_say("Cannot write %s: %s. Choose another file.", path, strerror(errno));
+        talk_print("Cannot write %s: %s. Choose another file.", path, strerror(errno));
         (void)unlink(temporary);
         return false;
     }
@@ -166,14 +166,14 @@ static const char *value_of(const bringup_t *self, const bringup_note_t *note, c
     return out_value;
 }
 
-static void tell_findings(const bringup_t *self) {
+static void report_findings(const bringup_t *self) {
     char value[32];
-    talk_say("Results:");
+    talk_print("Results:");
     for (unsigned i = 0; i < self->notes; i++) {
         const bringup_note_t *note = &self->note[i];
         (void)printf("  %s [%s] %s%s%s\n", (note->item != NULL) ? "confirmed" : "noted    ", note->section, note->key,
                      (value_of(self, note, value)[0] != '\0') ? " = " : "", value);
-        talk_say("    %s", note->text);
+        talk_print("    %s", note->text);
     }
 }
 
@@ -212,14 +212,14 @@ static bool may_keep(const bringup_t *self) {
 }
 
 /// Confirms the results if that is possible here, and prints what remains to be done with the file.
-static void tell_next(bringup_t *self, const char *path) {
+static void report_next(bringup_t *self, const char *path) {
     char value[32];
     if (may_keep(self) && confirm_all(self)) {
-        talk_say("The confirmed results are stored in %s. Next: iwheel-gateway -c %s", self->config.record.directory,
-                 path);
+        talk_print("The confirmed results are stored in %s. Next: iwheel-gateway -c %s", self->config.record.directory,
+                   path);
         return;
     }
-    talk_say("Next: iwheel-gateway -c %s, and when it runs, confirm the results:", path);
+    talk_print("Next: iwheel-gateway -c %s, and when it runs, confirm the results:", path);
     for (unsigned i = 0; i < self->notes; i++) {
         const bringup_note_t *note = &self->note[i];
         if (note->item != NULL) {
@@ -234,11 +234,11 @@ void bringup_write(bringup_t *self) {
     char path[BRINGUP_ANSWER_SIZE];
     talk_step(BRINGUP_STEPS, "the configuration");
     trial_stop(self);
-    tell_findings(self);
+    report_findings(self);
     do {
         talk_ask(self, "Write it to", self->out_path, path);
     } while ((access(path, F_OK) == 0 && !talk_yes(self, "That file exists. Replace it?", false)) ||
              !bringup_write_file(self, path, false));
-    talk_say("Written to %s.", path);
-    tell_next(self, path);
+    talk_print("Written to %s.", path);
+    report_next(self, path);
 }

@@ -72,16 +72,16 @@ static int configure(bringup_t *self, const words_t *words) {
 
 /// Explains bringup and its conditions. Ends bringup if the operator does not agree.
 static void introduce(bringup_t *self) {
-    talk_say("iwheelctl bringup: from unknown wheels to a configuration that you have tested.");
-    talk_say(" ");
-    talk_say(
+    talk_print("iwheelctl bringup: from unknown wheels to a configuration that you have tested.");
+    talk_print(" ");
+    talk_print(
         "Bus %s, e-stop %s. Ten steps; in three of them WHEELS TURN. Both wheels must hang in the air, free to "
         "turn, and no person or thing may touch them. Keep a finger on the e-stop. They turn only directly after a "
         "question, with at most %d mm/s and %d mA, for two seconds at most; the e-stop and any key stop them "
         "immediately.",
         self->config.bus.interface, self->config.estop.line, 2 * BRINGUP_SPEED_MM_S, self->current_mA);
-    talk_say("The word in [brackets] stands for an empty answer; q ends bringup. Nothing is written before the last "
-             "step.");
+    talk_print("An empty answer means the word in [brackets]; q ends bringup. Nothing is written before the last "
+               "step.");
     if (!talk_yes(self, "Wheels in the air, finger on the e-stop?", false)) {
         bringup_quit(self);
     }
@@ -89,7 +89,8 @@ static void introduce(bringup_t *self) {
 
 _Noreturn static void end(bringup_t *self, const char *message) {
     trial_close(self);
-    talk_say("%s", message);
+    talk_forget(); // A key that stopped the wheels is not for the shell.
+    talk_print("%s", message);
     exit(ctl_finish(CTL_NO));
 }
 
@@ -118,7 +119,7 @@ _Noreturn static void end_with_offer(bringup_t *self) {
     if (count == 0U || !talk_yes(self, question, true) || !bringup_write_file(self, path, true)) {
         bringup_abandon(self);
     }
-    talk_say("Saved. To continue:");
+    talk_print("Saved. To continue:");
     (void)printf("  iwheelctl bringup %s --from %s\n", self->out_path, path);
     end(self, "Ended. The configuration is not complete, and was not written.");
 }
@@ -150,7 +151,7 @@ typedef struct {
 /// Runs the step until it is done. bringup_fail leads back to its begin if the operator wants to repeat it.
 static void run_step(bringup_t *self, const step_t *step) {
     if (bringup_is_restored(self, step->number)) {
-        talk_step(step->number, "confirmed by the earlier bringup; left out");
+        talk_step(step->number, "confirmed by the earlier bringup; skipped");
         return;
     }
     (void)setjmp(self->disturbed);

@@ -38,13 +38,13 @@ unsigned doctor_interfaces(char *out_names, size_t size);
 
 /// Checks the parts that do not need an open bus: kernel, driver, clock, rights. Returns false if the kernel cannot
 /// open a bus.
-bool doctor_look_at_machine(doctor_t *self);
+bool doctor_check_machine(doctor_t *self);
 
 /// Adds the findings from the gateway's status, if there is a gateway.
-void doctor_look_at_gateway(doctor_t *self);
+void doctor_check_gateway(doctor_t *self);
 
 /// Opens the bus (and, without a gateway, the e-stop), listens and judges.
-void doctor_look_at_bus(doctor_t *self);
+void doctor_check_bus(doctor_t *self);
 
 /// Closes everything that is open.
 void doctor_close(doctor_t *self);

@@ -16,12 +16,12 @@ static bool forces_known(const json_t *status) {
            json_is_integer(json_object_get(json_object_get(status, "right"), "force_net_mN"));
 }
 
-static void say_contradicted(doctor_t *self, const char *name, const json_t *entry) {
+static void add_contradicted(doctor_t *self, const char *name, const json_t *entry) {
     iw_assumption_item_t item = IW_ASSUMPTION_ITEMS; // Item of a gateway that is newer than this program.
     const bool known = iwn_assumption_item_of(name, &item);
     const bool tared = known && item == IW_ASSUMPTION_OFFSET_INCLUDED && forces_known(self->gateway.status);
     const bool harmless = known && item == IW_ASSUMPTION_DLC;
-    inspect_say(&self->findings, "ledger",
+    inspect_add(&self->findings, "ledger",
                 tared      ? INSPECT_OK
                 : harmless ? INSPECT_WARN
                            : INSPECT_FAIL,
@@ -42,11 +42,11 @@ static void list_contradicted(doctor_t *self, json_t *assumptions) {
         assumed += (strcmp(state, "assumed") == 0) ? 1U : 0U;
         confirmed += (strcmp(state, "confirmed") == 0) ? 1U : 0U;
         if (strcmp(state, "contradicted") == 0) {
-            say_contradicted(self, name, entry);
+            add_contradicted(self, name, entry);
         }
     }
     if (assumed + confirmed > 0U) {
-        inspect_say(&self->findings, "ledger", INSPECT_OK,
+        inspect_add(&self->findings, "ledger", INSPECT_OK,
                     "assumptions about the wheels: %u confirmed, %u never verified (iwheelctl status lists them)",
                     confirmed, assumed);
     }
@@ -60,7 +60,7 @@ static void list_unset(doctor_t *self) {
     } needed[] = {{"setpoint_type", "setpoint_type"}, {"current_role", "current_role"}, {"track", "track_mm"}};
     for (size_t i = 0; i < sizeof needed / sizeof needed[0]; i++) {
         if (advice_is_unset(self->gateway.status, needed[i].item)) {
-            inspect_say(&self->findings, "config", INSPECT_WARN, "%s not configured: the gateway refuses arm",
+            inspect_add(&self->findings, "config", INSPECT_WARN, "%s not configured: the gateway refuses arm",
                         needed[i].key);
             inspect_fix(&self->findings,
                         "set it under [wheels] in the configuration; if it is unknown: iwheelctl bringup finds it");
@@ -72,7 +72,7 @@ static void list_unset(doctor_t *self) {
 static void judge_sending(doctor_t *self) {
     char fix[ADVICE_SIZE];
     if (advice_is_present(self->gateway.status, "send_stalled")) {
-        inspect_say(&self->findings, "send_stalled", INSPECT_FAIL,
+        inspect_add(&self->findings, "send_stalled", INSPECT_FAIL,
                     "a setpoint of the gateway is not acknowledged on the bus");
         (void)advice_fix(self->gateway.status, "send_stalled", fix);
         inspect_fix(&self->findings, "%s", fix);
@@ -84,7 +84,7 @@ static void check_status(doctor_t *self) {
     const json_t *status = self->gateway.status;
     const char *state = text_word(status, "state");
     const bool latched = strcmp(state, "latched") == 0;
-    inspect_say(findings, "gateway", latched ? INSPECT_WARN : INSPECT_OK, "gateway %s at %s serves %s: %s%s%s",
+    inspect_add(findings, "gateway", latched ? INSPECT_WARN : INSPECT_OK, "gateway %s at %s serves %s: %s%s%s",
                 text_word(status, "version"), self->gateway.path, self->gateway.bus, state, latched ? ", " : "",
                 latched ? text_word(status, "cause") : "");
     if (latched) {
@@ -92,7 +92,7 @@ static void check_status(doctor_t *self) {
     }
     judge_sending(self);
     if (advice_is_present(status, "second_master")) {
-        inspect_say(findings, "second_master", INSPECT_FAIL,
+        inspect_add(findings, "second_master", INSPECT_FAIL,
                     "the gateway receives setpoints of another sender, id 266 (0x10A) or 298 (0x12A)");
         inspect_fix(findings, "switch off the other program or device that sends them");
     }
@@ -110,7 +110,7 @@ static void fix_denied(doctor_t *self) {
                 (group != NULL) ? group->gr_name : "iwheel");
 }
 
-void doctor_look_at_gateway(doctor_t *self) {
+void doctor_check_gateway(doctor_t *self) {
     inspect_findings_t *findings = &self->findings;
     const char *path = self->gateway.path;
     switch (self->gateway.result) {
@@ -118,23 +118,23 @@ void doctor_look_at_gateway(doctor_t *self) {
         check_status(self);
         break;
     case NEAR_OTHER:
-        inspect_say(findings, "gateway", INSPECT_OK, "gateway at %s: it serves %s, not this bus", path,
+        inspect_add(findings, "gateway", INSPECT_OK, "gateway at %s: it serves %s, not this bus", path,
                     self->gateway.bus);
         break;
     case NEAR_DENIED:
-        inspect_say(findings, "gateway", INSPECT_FAIL, "gateway at %s: you may not use it", path);
+        inspect_add(findings, "gateway", INSPECT_FAIL, "gateway at %s: you may not use it", path);
         fix_denied(self);
         break;
     case NEAR_MUTE:
-        inspect_say(findings, "gateway", INSPECT_FAIL, "gateway at %s: it accepts the connection and does not answer",
+        inspect_add(findings, "gateway", INSPECT_FAIL, "gateway at %s: it accepts the connection and does not answer",
                     path);
         inspect_fix(findings, "see its log: journalctl -u iwheel-gateway; then: systemctl restart iwheel-gateway");
         break;
     case NEAR_SEVERAL:
-        inspect_say(findings, "gateway", INSPECT_OK, "several gateways are running: %s", path);
+        inspect_add(findings, "gateway", INSPECT_OK, "several gateways are running: %s", path);
         break;
     case NEAR_NONE:
-        inspect_say(findings, "gateway", INSPECT_OK, "gateway: none is running; doctor reads the bus itself");
+        inspect_add(findings, "gateway", INSPECT_OK, "gateway: none is running; doctor reads the bus itself");
         break;
     }
 }
@@ -209,7 +209,7 @@ inspect_estop_t doctor_estop(doctor_t *self) {
     };
 }
 
-void doctor_look_at_bus(doctor_t *self) {
+void doctor_check_bus(doctor_t *self) {
     const inspect_config_t config = {
         .name = self->bus,
         .bitrate_hz = self->config.bus.bitrate,

@@ -73,12 +73,12 @@ static void read_driver(const char *bus, char *out_name, size_t size) {
     }
 }
 
-static void say_no_can(doctor_t *self) {
+static void add_no_can(doctor_t *self) {
     struct utsname kernel;
     char path[512];
     (void)uname(&kernel);
     (void)snprintf(path, sizeof path, "/lib/modules/%s", kernel.release);
-    inspect_say(&self->findings, "kernel", INSPECT_FAIL, "kernel %s: no CAN sockets", kernel.release);
+    inspect_add(&self->findings, "kernel", INSPECT_FAIL, "kernel %s: no CAN sockets", kernel.release);
     if (access(path, F_OK) == 0) {
         inspect_fix(&self->findings, "modprobe can_raw (and permanently: echo can_raw > /etc/modules-load.d/can.conf)");
     } else {
@@ -93,16 +93,16 @@ static bool check_kernel(doctor_t *self) {
     char driver[64];
     const int probe = socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC, CAN_RAW);
     if (probe < 0) {
-        say_no_can(self);
+        add_no_can(self);
         return false;
     }
     (void)close(probe);
     read_driver((self->bus != NULL) ? self->bus : "", driver, sizeof driver);
     if (driver[0] != '\0') {
-        inspect_say(&self->findings, "kernel", INSPECT_OK, "kernel: CAN sockets are available; %s has the driver %s",
+        inspect_add(&self->findings, "kernel", INSPECT_OK, "kernel: CAN sockets are available; %s has the driver %s",
                     self->bus, driver);
     } else {
-        inspect_say(&self->findings, "kernel", INSPECT_OK, "kernel: CAN sockets are available");
+        inspect_add(&self->findings, "kernel", INSPECT_OK, "kernel: CAN sockets are available");
     }
     return true;
 }
@@ -129,19 +129,19 @@ static void check_clock(doctor_t *self) {
     (void)clock_getres(CLOCK_MONOTONIC, &resolution);
     const int64_t late_us = worst_lateness_us();
     if (resolution.tv_nsec > NAP_NS || late_us > LATE_CARE_us) {
-        inspect_say(findings, "clock", INSPECT_WARN, "clock: a sleep of 1 ms ended up to %.1f ms late",
+        inspect_add(findings, "clock", INSPECT_WARN, "clock: a sleep of 1 ms ended up to %.1f ms late",
                     (double)late_us / 1e3);
         inspect_fix(findings, "the gateway stops the wheels when it is 100 ms late: reduce this machine's load, or "
                               "run it with priority: chrt -f 10 iwheel-gateway ...");
     } else {
-        inspect_say(findings, "clock", INSPECT_OK, "clock: a sleep of 1 ms ends at most %.1f ms late",
+        inspect_add(findings, "clock", INSPECT_OK, "clock: a sleep of 1 ms ends at most %.1f ms late",
                     (double)late_us / 1e3);
     }
     if (time(NULL) < WALL_MIN_S) {
-        inspect_say(findings, "clock", INSPECT_WARN, "wall clock: it is not set; only dates in logs are wrong");
+        inspect_add(findings, "clock", INSPECT_WARN, "wall clock: it is not set; only dates in logs are wrong");
         inspect_fix(findings, "timedatectl set-ntp true");
     } else if (adjtimex(&state) == TIME_ERROR || ((unsigned)state.status & (unsigned)STA_UNSYNC) != 0U) {
-        inspect_say(findings, "clock", INSPECT_OK,
+        inspect_add(findings, "clock", INSPECT_OK,
                     "wall clock: set, not synchronised; only dates in logs depend on it");
     }
 }
@@ -160,15 +160,15 @@ static void check_rights(doctor_t *self) {
         member = member || groups[i] == group->gr_gid;
     }
     if (member) {
-        inspect_say(&self->findings, "rights", INSPECT_OK, "rights: you are in group %s", group_name);
+        inspect_add(&self->findings, "rights", INSPECT_OK, "rights: you are in group %s", group_name);
     } else {
-        inspect_say(&self->findings, "rights", INSPECT_WARN,
+        inspect_add(&self->findings, "rights", INSPECT_WARN,
                     "rights: you are not in group %s, whose members may use the gateway", group_name);
         inspect_fix(&self->findings, "sudo usermod -aG %s $USER, then log in again", group_name);
     }
 }
 
-bool doctor_look_at_machine(doctor_t *self) {
+bool doctor_check_machine(doctor_t *self) {
     const bool able = (self->bus != NULL && is_local(self->bus)) || check_kernel(self);
     check_clock(self);
     check_rights(self);

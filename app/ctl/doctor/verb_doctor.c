@@ -14,7 +14,7 @@
 #define LISTEN_MAX_US 60000000
 /// Maximum time to wait for a press, or a release.
 #define WAIT_US 20000000
-#define LOOK_MS 20
+#define POLL_MS 20
 
 typedef struct {
     const char *bus;
@@ -74,13 +74,13 @@ static void choose_bus(doctor_t *self, const words_t *words) {
     }
 }
 
-static void say_no_bus(doctor_t *self) {
+static void add_no_bus(doctor_t *self) {
     char names[256];
     if (doctor_interfaces(names, sizeof names) > 0U) {
-        inspect_say(&self->findings, "interface", INSPECT_FAIL, "bus: there are several CAN interfaces: %s", names);
+        inspect_add(&self->findings, "interface", INSPECT_FAIL, "bus: there are several CAN interfaces: %s", names);
         inspect_fix(&self->findings, "name one: iwheelctl doctor IFACE");
     } else {
-        inspect_say(&self->findings, "interface", INSPECT_FAIL, "bus: this machine has no CAN interface");
+        inspect_add(&self->findings, "interface", INSPECT_FAIL, "bus: this machine has no CAN interface");
         inspect_fix(&self->findings, "plug the adapter in and load its driver (ip -brief link show type can); without "
                                      "hardware: iwheel-sim --can unix:/tmp/bus, then: iwheelctl doctor unix:/tmp/bus");
     }
@@ -89,7 +89,7 @@ static void say_no_bus(doctor_t *self) {
 static void print_text(const paper_t *paper, tone_t tone, const char *text) {
     for (bool first = true; *text != '\0' || first; first = false) {
         const size_t cut = text_cut(text, PAPER_WIDTH - INDENT);
-        paper_say(paper, tone, "%s%.*s", first ? "" : "      ", (int)cut, text);
+        paper_print(paper, tone, "%s%.*s", first ? "" : "      ", (int)cut, text);
         paper_end(paper);
         text += cut;
         text += strspn(text, " ");
@@ -105,7 +105,7 @@ void doctor_print(const doctor_t *self, unsigned first) {
         print_text(&paper, TONE_PLAIN, finding->text);
         if (finding->fix[0] != '\0') {
             // Printed in one line, so that users can copy it.
-            paper_say(&paper, TONE_TITLE, "      -> %s", finding->fix);
+            paper_print(&paper, TONE_TITLE, "      -> %s", finding->fix);
             paper_end(&paper);
         }
     }
@@ -114,7 +114,7 @@ void doctor_print(const doctor_t *self, unsigned first) {
 static void print_sum(const doctor_t *self) {
     const unsigned *total = self->findings.total;
     (void)printf("%u ok, %u to check, %u wrong%s\n", total[INSPECT_OK], total[INSPECT_WARN], total[INSPECT_FAIL],
-                 (total[INSPECT_FAIL] > 0U) ? ": begin with the first" : "");
+                 (total[INSPECT_FAIL] > 0U) ? "; fix the first one, then run doctor again" : "");
 }
 
 static json_t *rates_of(const doctor_t *self) {
@@ -150,17 +150,17 @@ static void print_json(const doctor_t *self) {
 
 static void examine(doctor_t *self, const words_t *words) {
     inspect_begin(&self->findings);
-    near_look(self->ctl, words->bus, &self->gateway);
+    near_find(self->ctl, words->bus, &self->gateway);
     choose_bus(self, words);
-    doctor_look_at_gateway(self);
-    const bool able = doctor_look_at_machine(self);
+    doctor_check_gateway(self);
+    const bool able = doctor_check_machine(self);
     if (self->bus == NULL) {
-        say_no_bus(self);
+        add_no_bus(self);
     } else if (able) {
         if (!self->ctl->json && text_live_columns(stderr) > 0U) {
             (void)fprintf(stderr, "listening to %s for %.1f s ...\r", self->bus, self->listen_ms / 1e3);
         }
-        doctor_look_at_bus(self);
+        doctor_check_bus(self);
     }
 }
 
@@ -178,7 +178,7 @@ static bool await_level(doctor_t *self, bool pressed, bool *out_skipped) {
             return true;
         }
         struct pollfd key = {.fd = STDIN_FILENO, .events = POLLIN};
-        if (poll(&key, 1, LOOK_MS) > 0) {
+        if (poll(&key, 1, POLL_MS) > 0) {
             char line[64];
             *out_skipped = true;
             (void)!read(STDIN_FILENO, line, sizeof line);
@@ -188,12 +188,12 @@ static bool await_level(doctor_t *self, bool pressed, bool *out_skipped) {
     return false;
 }
 
-static void say_unseen(doctor_t *self, bool skipped, const char *what) {
+static void add_unseen(doctor_t *self, bool skipped, const char *what) {
     if (skipped) {
-        inspect_say(&self->findings, "estop_press", INSPECT_WARN, "e-stop: %s was not tried", what);
+        inspect_add(&self->findings, "estop_press", INSPECT_WARN, "e-stop: %s was not tried", what);
         inspect_fix(&self->findings, "run doctor again and press the button when asked");
     } else {
-        inspect_say(&self->findings, "estop_press", INSPECT_FAIL, "e-stop: no %s was seen within 20 s", what);
+        inspect_add(&self->findings, "estop_press", INSPECT_FAIL, "e-stop: no %s was seen within 20 s", what);
         inspect_fix(&self->findings, "check the button's wire, [estop] line and [estop] active");
     }
 }
@@ -207,7 +207,7 @@ static void press(doctor_t *self) {
         return;
     }
     if (self->gateway.result == NEAR_FOUND && (strcmp(state, "armed") == 0 || strcmp(state, "stopping") == 0)) {
-        inspect_say(&self->findings, "estop_press", INSPECT_WARN, "e-stop: not tried, because a client drives");
+        inspect_add(&self->findings, "estop_press", INSPECT_WARN, "e-stop: not tried, because a client drives");
         inspect_fix(&self->findings, "iwheelctl stop, then run doctor again");
         return;
     }
@@ -215,7 +215,7 @@ static void press(doctor_t *self) {
     (void)fflush(stdout);
     if (!await_level(self, true, &skipped)) {
         (void)fputs("\n", stdout);
-        say_unseen(self, skipped, "press");
+        add_unseen(self, skipped, "press");
         return;
     }
     (void)fputs("seen. Release it ... ", stdout);
@@ -223,10 +223,10 @@ static void press(doctor_t *self) {
     const bool released = await_level(self, false, &skipped);
     (void)fputs(released ? "seen.\n\n" : "\n\n", stdout);
     if (!released) {
-        say_unseen(self, skipped, "release");
+        add_unseen(self, skipped, "release");
         return;
     }
-    inspect_say(&self->findings, "estop_press", INSPECT_OK, "e-stop: press and release were seen%s",
+    inspect_add(&self->findings, "estop_press", INSPECT_OK, "e-stop: press and release were seen%s",
                 (self->gateway.result == NEAR_FOUND) ? "; the gateway is latched now, as it must be" : "");
     if (self->gateway.result == NEAR_FOUND) {
         inspect_fix(&self->findings, "iwheelctl reset");

@@ -27,7 +27,7 @@
 #define LEASE_MIN_MS 20
 #define LEASE_MAX_MS 500
 /// Without telemetry a wheel is not known to be at standstill. The program waits this time for telemetry.
-#define UNHEARD_US 2000000
+#define OFFLINE_US 2000000
 
 typedef enum { END_NONE = 0, END_TIME, END_SIGNAL, END_REFUSED, END_SILENT, END_LOST } end_t;
 
@@ -219,7 +219,7 @@ static int wait_for_rest(drive_t *self) {
         if (both_stand(self->latest) && now_us >= fresh_us) {
             return CTL_OK;
         }
-        if (!both_online(self->latest) && now_us >= begin_us + UNHEARD_US) {
+        if (!both_online(self->latest) && now_us >= begin_us + OFFLINE_US) {
             return ctl_fail(CTL_NO, "stopped, but a wheel is offline, so it may still turn; see: iwheelctl status");
         }
         if (now_us >= begin_us + REST_US) {
@@ -304,8 +304,8 @@ static int finish(drive_t *self, end_t end) {
     clear_progress(self);
     if (end == END_LOST) {
         return ctl_fail(CTL_UNAVAILABLE,
-                        "the lease ended with the connection: the gateway stops the wheels, or else their own "
-                        "watchdog (1 s) does");
+                        "the lease ended with the connection: the gateway stops the wheels; if the gateway is dead, "
+                        "their own watchdog (1 s) stops them");
     }
     if (self->ctl->json && self->last_line[0] != '\0') {
         text_json(self->last_line, stdout);

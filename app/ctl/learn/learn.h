@@ -45,14 +45,14 @@ typedef struct {
     uint64_t count;
     uint64_t sent; ///< Marked as sent by the program that recorded them.
     uint64_t type[256];
-    uint64_t type_moving[256]; ///< With a speed that is not 0.
-    uint64_t at_rest;          ///< With speed 0.
-    uint64_t forward;          ///< With a positive speed.
+    uint64_t type_moving[256]; ///< Setpoints of this type with a speed that is not 0.
+    uint64_t at_rest;          ///< Setpoints with speed 0.
+    uint64_t forward;          ///< Setpoints with a positive speed.
     uint64_t backward;         ///< With a negative speed.
     learn_range_t speed_mm_s;
     learn_range_t current_mA;
-    learn_range_t current_at_rest_mA;  ///< With speed 0.
-    learn_range_t current_forward_mA;  ///< With a positive speed.
+    learn_range_t current_at_rest_mA;  ///< Setpoints with speed 0.
+    learn_range_t current_forward_mA;  ///< Setpoints with a positive speed.
     learn_range_t current_backward_mA; ///< With a negative speed.
     uint64_t padding;                  ///< Frames with a byte after the documented five that is not 0.
     uint64_t over_limit;               ///< Frames with a current outside the documented range.

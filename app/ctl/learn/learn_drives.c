@@ -5,7 +5,7 @@
 #include <string.h>
 
 /// A wheel without a speed frame for a longer time is not compared, as in the gateway (`wheel_silent_ms`).
-#define HEARD_US 50000
+#define RECEIVED_US 50000
 /// A drive has ended if no speed was commanded for this time. It has also ended without setpoints, because the wheels
 /// stop on their own then.
 #define ENDED_US ((int64_t)IW_WHEEL_WATCHDOG_US)
@@ -20,12 +20,12 @@ void learn_drives_init(learn_drives_t *self, const iw_config_t *config) {
     }
 }
 
-uint32_t learn_drives_told(const learn_drives_t *self) {
+uint32_t learn_drives_printed(const learn_drives_t *self) {
     return (self->count < LEARN_DRIVES_MAX) ? self->count : LEARN_DRIVES_MAX;
 }
 
 static learn_drive_t *last_drive(learn_drives_t *self) {
-    return &self->drive[learn_drives_told(self) - ((self->count > LEARN_DRIVES_MAX) ? 0U : 1U)];
+    return &self->drive[learn_drives_printed(self) - ((self->count > LEARN_DRIVES_MAX) ? 0U : 1U)];
 }
 
 static bool is_recent(int64_t then_us, int64_t now_us, int64_t span_us) {
@@ -42,7 +42,7 @@ static bool has_ended(const learn_drives_t *self, int64_t now_us) {
 static void compare(learn_drives_t *self, int64_t now_us) {
     bool known = true;
     for (size_t side = 0; side < IW_SIDES; side++) {
-        known = known && is_recent(self->received_us[side], now_us, HEARD_US) &&
+        known = known && is_recent(self->received_us[side], now_us, RECEIVED_US) &&
                 is_recent(self->setpoint_us[side], now_us, ENDED_US);
     }
     if (!known || !self->compared) {
@@ -64,7 +64,7 @@ static void compare(learn_drives_t *self, int64_t now_us) {
 static void note_setpoint(learn_drives_t *self, size_t side, int32_t speed_mm_s, int64_t now_us) {
     self->pair.applied_mm_s[side] = self->config->invert[side] ? -speed_mm_s : speed_mm_s;
     self->setpoint_us[side] = now_us;
-    learn_lag_tell(&self->lag[side], now_us, speed_mm_s);
+    learn_lag_command(&self->lag[side], now_us, speed_mm_s);
     if (speed_mm_s == 0) {
         return;
     }
@@ -111,19 +111,20 @@ void learn_drives_frame(learn_drives_t *self, const candump_t *frame) {
 void learn_drives_weigh(const learn_drives_t *self, learn_findings_t *out_findings) {
     const uint32_t limit_mm = self->config->pair_mm;
     if (self->judged_us < LEARN_SHOWN_MIN_US) {
-        (void)learn_say(out_findings, '?', "pair", LEARN_BOTH,
-                        "deviation from the path: the recording lacks half a second with setpoints and speed frames of "
-                        "both wheels");
+        (void)learn_print(
+            out_findings, '?', "pair", LEARN_BOTH,
+            "deviation from the path: the recording lacks half a second with setpoints and speed frames of "
+            "both wheels");
     } else if (self->largest_mm < limit_mm) {
-        (void)learn_say(out_findings, '+', "pair", LEARN_BOTH,
-                        "the machine left its path by %" PRIu32 " mm at most; the gateway stops at %" PRIu32
-                        " (pair_mm)",
-                        self->largest_mm, limit_mm);
+        (void)learn_print(out_findings, '+', "pair", LEARN_BOTH,
+                          "the machine left its path by %" PRIu32 " mm at most; the gateway stops at %" PRIu32
+                          " (pair_mm)",
+                          self->largest_mm, limit_mm);
     } else {
-        (void)learn_say(out_findings, '-', "pair", LEARN_BOTH,
-                        "the machine left its path by %" PRIu32 " mm; the gateway stops at %" PRIu32
-                        " (pair_mm): was a wheel blocked or slow? is one mounted mirrored (--config)?",
-                        self->largest_mm, limit_mm);
+        (void)learn_print(out_findings, '-', "pair", LEARN_BOTH,
+                          "the machine left its path by %" PRIu32 " mm; the gateway stops at %" PRIu32
+                          " (pair_mm): was a wheel blocked or slow? is one mounted mirrored (--config)?",
+                          self->largest_mm, limit_mm);
     }
     learn_lag_weigh(self->lag, self->config->wheel_lag_ms, out_findings);
 }

@@ -42,7 +42,7 @@ void learn_drives_init(learn_drives_t *self, const iw_config_t *config);
 void learn_drives_frame(learn_drives_t *self, const candump_t *frame);
 
 /// Returns the number of drives that are reported one by one.
-uint32_t learn_drives_told(const learn_drives_t *self);
+uint32_t learn_drives_printed(const learn_drives_t *self);
 
 /// Adds the findings about the drives.
 void learn_drives_weigh(const learn_drives_t *self, learn_findings_t *out_findings);

@@ -11,8 +11,8 @@ bool learn_is_empty(const learn_range_t *range) {
     return range->low > range->high;
 }
 
-learn_finding_t *learn_say(learn_findings_t *self, char mark, const char *item, unsigned side, const char *format,
-                           ...) {
+learn_finding_t *learn_print(learn_findings_t *self, char mark, const char *item, unsigned side, const char *format,
+                             ...) {
     // The list cannot overflow: each sentence is added once, or once per side.
     learn_finding_t *finding = &self->at[(self->count < LEARN_FINDINGS_MAX - 1U) ? self->count++ : self->count];
     va_list list;
@@ -57,7 +57,7 @@ bool learn_suggests(const learn_findings_t *self, const learn_finding_t *finding
 
 static void weigh_frames(const learn_t *self, learn_findings_t *out) {
     if (self->strange > 0U) {
-        (void)learn_say(
+        (void)learn_print(
             out, '-', "frames", LEARN_BOTH,
             "%" PRIu64
             " remote, extended or FD frames with one of the eleven numbers: the gateway ignores them. python-can "
@@ -65,18 +65,19 @@ static void weigh_frames(const learn_t *self, learn_findings_t *out) {
             self->strange);
     }
     if (self->too_short > 0U) {
-        (void)learn_say(out, '-', "frames", LEARN_BOTH,
-                        "%" PRIu64 " frames are shorter than in the document: the gateway ignores them",
-                        self->too_short);
+        (void)learn_print(out, '-', "frames", LEARN_BOTH,
+                          "%" PRIu64 " frames are shorter than in the document: the gateway ignores them",
+                          self->too_short);
     }
     if (self->errors > 0U) {
-        (void)learn_say(out, '-', "bus", LEARN_BOTH,
-                        "%" PRIu64 " reports of errors on the bus: cable, termination, bit rate?", self->errors);
+        (void)learn_print(out, '-', "bus", LEARN_BOTH,
+                          "%" PRIu64 " reports of errors on the bus: cable, termination, bit rate?", self->errors);
     }
     if (self->backwards > 0U) {
-        (void)learn_say(out, '-', "time", LEARN_BOTH,
-                        "time goes back %" PRIu64 " times: several recordings in one file? periods are doubtful",
-                        self->backwards);
+        (void)learn_print(out, '-', "time", LEARN_BOTH,
+                          "time goes back %" PRIu64
+                          " times: does the file contain several recordings? The periods are not reliable",
+                          self->backwards);
     }
 }
 
@@ -84,20 +85,20 @@ static void weigh_oddities(const learn_t *self, unsigned side, learn_findings_t 
     const learn_setpoint_t *setpoint = &self->setpoint[side];
     const int64_t longest_us = self->known[side].period.longest_us;
     if (setpoint->over_limit > 0U) {
-        (void)learn_say(out, '-', "current", side,
-                        "%s: %" PRIu64 " setpoints with a current beyond the documented +/-2000 mA", text_side(side),
-                        setpoint->over_limit);
+        (void)learn_print(out, '-', "current", side,
+                          "%s: %" PRIu64 " setpoints with a current beyond the documented +/-2000 mA", text_side(side),
+                          setpoint->over_limit);
     }
     if (setpoint->padding > 0U) {
-        (void)learn_say(out, '-', "padding", side,
-                        "%s: %" PRIu64 " setpoints have nonzero bytes after the five documented ones", text_side(side),
-                        setpoint->padding);
+        (void)learn_print(out, '-', "padding", side,
+                          "%s: %" PRIu64 " setpoints have nonzero bytes after the five documented ones",
+                          text_side(side), setpoint->padding);
     }
     if (longest_us > (int64_t)IW_WHEEL_WATCHDOG_US) {
-        (void)learn_say(out, '-', "silence", side,
-                        "%s: up to %" PRId64
-                        " ms without a setpoint; by the document a wheel stops on its own after 1000 ms",
-                        text_side(side), longest_us / 1000);
+        (void)learn_print(out, '-', "silence", side,
+                          "%s: up to %" PRId64
+                          " ms without a setpoint; according to the document a wheel stops on its own after 1000 ms",
+                          text_side(side), longest_us / 1000);
     }
 }
 
@@ -109,7 +110,7 @@ void learn_weigh(const learn_t *self, learn_findings_t *out_findings) {
     }
     learn_weigh_setpoints(self, out_findings);
     learn_weigh_wheels(self, out_findings);
-    (void)learn_say(
+    (void)learn_print(
         out_findings, '?', "mounting", LEARN_BOTH,
         "mirrored mounting, radius, track and the meaning of byte 0: no recording shows them; use iwheelctl "
         "bringup");

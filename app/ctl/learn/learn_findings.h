@@ -36,8 +36,8 @@ typedef struct {
 void learn_weigh(const learn_t *self, learn_findings_t *out_findings);
 
 /// Adds a finding. Returns it, so that the caller can set its value.
-__attribute__((format(printf, 5, 6))) learn_finding_t *learn_say(learn_findings_t *self, char mark, const char *item,
-                                                                 unsigned side, const char *format, ...);
+__attribute__((format(printf, 5, 6))) learn_finding_t *learn_print(learn_findings_t *self, char mark, const char *item,
+                                                                   unsigned side, const char *format, ...);
 
 /// Returns the first finding about the item and side, or NULL.
 const learn_finding_t *learn_find(const learn_findings_t *self, const char *item, unsigned side);

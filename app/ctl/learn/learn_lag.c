@@ -83,7 +83,7 @@ void learn_lag_receive(learn_lag_t *self, int64_t at_us, double speed_mm_s) {
     self->measured_us = at_us;
 }
 
-void learn_lag_tell(learn_lag_t *self, int64_t at_us, int32_t speed_mm_s) {
+void learn_lag_command(learn_lag_t *self, int64_t at_us, int32_t speed_mm_s) {
     const bool first = self->commanded_us < 0 || at_us < self->commanded_us;
     self->commanded_us = at_us;
     if (!first && speed_mm_s == self->commanded_mm_s) {
@@ -117,18 +117,19 @@ static bool is_sure(const learn_lag_t *self) {
 
 static void weigh_one(const learn_lag_t *self, unsigned side, uint32_t lag_ms, learn_findings_t *out) {
     if (self->count < COUNT_MIN) {
-        (void)learn_say(out, '?', "wheel_lag", side,
-                        "%s wheel's lag: two changes by 300 mm/s or more, each between two steady seconds, are not in "
-                        "it",
-                        text_side(side));
+        (void)learn_print(
+            out, '?', "wheel_lag", side,
+            "%s wheel's lag: the recording lacks two changes by 300 mm/s or more, each with a steady second before and "
+            "after it",
+            text_side(side));
         return;
     }
     const double off_ms = fabs(self->sum_ms / self->count - (double)lag_ms);
     const bool fits = is_sure(self) && off_ms * 100.0 <= (double)lag_ms * RANGE_PERCENT;
-    (void)learn_say(out, fits ? '+' : '-', "wheel_lag", side,
-                    "%s wheel is %" PRId32 " ms behind its setpoints (%" PRIu32
-                    " changes of speed: %.0f to %.0f); the gateway assumes %" PRIu32 " (wheel_lag_ms)",
-                    text_side(side), mean_ms(self), self->count, self->least_ms, self->most_ms, lag_ms);
+    (void)learn_print(out, fits ? '+' : '-', "wheel_lag", side,
+                      "%s wheel is %" PRId32 " ms behind its setpoints (%" PRIu32
+                      " changes of speed: %.0f to %.0f); the gateway assumes %" PRIu32 " (wheel_lag_ms)",
+                      text_side(side), mean_ms(self), self->count, self->least_ms, self->most_ms, lag_ms);
 }
 
 void learn_lag_weigh(const learn_lag_t wheel[IW_SIDES], uint32_t lag_ms, learn_findings_t *out_findings) {
@@ -137,8 +138,8 @@ void learn_lag_weigh(const learn_lag_t wheel[IW_SIDES], uint32_t lag_ms, learn_f
     }
     if (is_sure(&wheel[IW_LEFT]) && is_sure(&wheel[IW_RIGHT])) {
         const int32_t both_ms = (mean_ms(&wheel[IW_LEFT]) + mean_ms(&wheel[IW_RIGHT])) / 2;
-        learn_finding_t *finding = learn_say(out_findings, '+', "wheel_lag_ms", LEARN_BOTH,
-                                             "both wheels are %" PRId32 " ms behind their setpoints", both_ms);
+        learn_finding_t *finding = learn_print(out_findings, '+', "wheel_lag_ms", LEARN_BOTH,
+                                               "both wheels are %" PRId32 " ms behind their setpoints", both_ms);
         (void)snprintf(finding->value, sizeof finding->value, "%" PRId32, both_ms);
     }
 }

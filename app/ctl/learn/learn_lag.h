@@ -33,7 +33,7 @@ typedef struct {
 } learn_lag_t;
 
 void learn_lag_init(learn_lag_t *self);
-void learn_lag_tell(learn_lag_t *self, int64_t at_us, int32_t speed_mm_s);
+void learn_lag_command(learn_lag_t *self, int64_t at_us, int32_t speed_mm_s);
 void learn_lag_receive(learn_lag_t *self, int64_t at_us, double speed_mm_s);
 
 /// Adds the findings about both wheels; `lag_ms` is the value that the gateway assumes.

@@ -41,30 +41,32 @@ static void weigh_common_type(const learn_t *self, int type, learn_findings_t *o
     const char *unseen = unseen_motion(self);
     const char *stayed = lacking(!learn_stayed(&self->wheel[IW_LEFT]), !learn_stayed(&self->wheel[IW_RIGHT]));
     if (stayed != NULL) {
-        (void)learn_say(out, '-', "setpoint_type", LEARN_BOTH,
-                        "setpoint type: every setpoint with a speed has type %d, but %s did not follow it", type,
-                        stayed);
+        (void)learn_print(out, '-', "setpoint_type", LEARN_BOTH,
+                          "setpoint type: every setpoint with a speed has type %d, but %s did not follow it", type,
+                          stayed);
     } else if (unseen != NULL) {
-        (void)learn_say(out, '?', "setpoint_type", LEARN_BOTH,
-                        "setpoint type: every setpoint with a speed has type %d, but the recording does not show that "
-                        "%s followed it; "
-                        "record the speed frames too (256 = 0x100, 288 = 0x120), while a steady speed of 100 mm/s or "
-                        "more is commanded for seconds",
-                        type, unseen);
+        (void)learn_print(
+            out, '?', "setpoint_type", LEARN_BOTH,
+            "setpoint type: every setpoint with a speed has type %d, but the recording does not show that "
+            "%s followed it; "
+            "record the speed frames too (256 = 0x100, 288 = 0x120), while a steady speed of 100 mm/s or "
+            "more is commanded for seconds",
+            type, unseen);
     } else {
         learn_finding_t *finding =
-            learn_say(out, '+', "setpoint_type", LEARN_BOTH,
-                      "setpoint type %d moves the wheels: every setpoint with a speed has it, and "
-                      "both wheels followed",
-                      type);
+            learn_print(out, '+', "setpoint_type", LEARN_BOTH,
+                        "setpoint type %d moves the wheels: every setpoint with a speed has it, and "
+                        "both wheels followed",
+                        type);
         (void)snprintf(finding->value, sizeof finding->value, "%d", type);
         for (unsigned side = 0; side < IW_SIDES; side++) {
             const learn_setpoint_t *setpoint = &self->setpoint[side];
             if (setpoint->type[type] == setpoint->type_moving[type]) {
-                (void)learn_say(out, '?', "setpoint_type", side,
-                                "%s: no setpoint of type %d has speed 0, so the recording does not show whether a zero "
-                                "stops the wheel",
-                                text_side(side), type);
+                (void)learn_print(
+                    out, '?', "setpoint_type", side,
+                    "%s: no setpoint of type %d has speed 0, so the recording does not show whether a zero "
+                    "stops the wheel",
+                    text_side(side), type);
             }
         }
     }
@@ -76,28 +78,28 @@ static void weigh_type(const learn_t *self, learn_findings_t *out) {
     const char *idle = lacking(moving(left) > 0U, moving(right) > 0U);
     const char *few = lacking(moving(left) >= LEARN_FRAMES_MIN, moving(right) >= LEARN_FRAMES_MIN);
     if (idle != NULL) {
-        (void)learn_say(out, '?', "setpoint_type", LEARN_BOTH,
-                        "setpoint type: %s was never commanded to move; record while the other controller drives both",
-                        idle);
+        (void)learn_print(
+            out, '?', "setpoint_type", LEARN_BOTH,
+            "setpoint type: %s was never commanded to move; record while the other controller drives both", idle);
     } else if (moving_type(left) < 0 || moving_type(left) != moving_type(right)) {
-        (void)learn_say(
+        (void)learn_print(
             out, '-', "setpoint_type", LEARN_BOTH,
             "setpoint type: setpoints with a speed have several types, or different ones left and right; find "
             "out which type means speed");
     } else if (few != NULL) {
-        (void)learn_say(out, '?', "setpoint_type", LEARN_BOTH,
-                        "setpoint type: %s received a speed fewer than %u times; record a longer drive", few,
-                        LEARN_FRAMES_MIN);
+        (void)learn_print(out, '?', "setpoint_type", LEARN_BOTH,
+                          "setpoint type: %s received a speed fewer than %u times; record a longer drive", few,
+                          LEARN_FRAMES_MIN);
     } else {
         weigh_common_type(self, moving_type(left), out);
     }
     for (unsigned side = 0; side < IW_SIDES; side++) {
         const learn_setpoint_t *setpoint = &self->setpoint[side];
         if (setpoint->changes_of_type >= LEARN_FRAMES_MIN && setpoint->changes_of_type > setpoint->count / 4U) {
-            (void)learn_say(out, '-', "sender", side,
-                            "%s: the type changes %" PRIu64 " times in %" PRIu64
-                            " setpoints: two controllers on this bus?",
-                            text_side(side), setpoint->changes_of_type, setpoint->count);
+            (void)learn_print(out, '-', "sender", side,
+                              "%s: the type changes %" PRIu64 " times in %" PRIu64
+                              " setpoints: two controllers on this bus?",
+                              text_side(side), setpoint->changes_of_type, setpoint->count);
         }
     }
 }
@@ -105,14 +107,15 @@ static void weigh_type(const learn_t *self, learn_findings_t *out) {
 /// Reports whether all or some setpoints were sent by the program that recorded them.
 static void weigh_sender(uint64_t count, uint64_t sent, learn_findings_t *out) {
     if (sent == count) {
-        (void)learn_say(out, '-', "sender", LEARN_BOTH,
-                        "all setpoints are marked as sent by the program that recorded them: if that was this gateway, "
-                        "they only repeat its configuration and prove nothing");
+        (void)learn_print(
+            out, '-', "sender", LEARN_BOTH,
+            "all setpoints are marked as sent by the program that recorded them: if that was this gateway, "
+            "they only repeat its configuration and prove nothing");
     } else if (sent > 0U) {
-        (void)learn_say(out, '-', "sender", LEARN_BOTH,
-                        "%" PRIu64 " of %" PRIu64
-                        " setpoints are marked as sent by the recording program: two controllers?",
-                        sent, count);
+        (void)learn_print(out, '-', "sender", LEARN_BOTH,
+                          "%" PRIu64 " of %" PRIu64
+                          " setpoints are marked as sent by the recording program: two controllers?",
+                          sent, count);
     }
 }
 
@@ -156,7 +159,7 @@ static void list_rare(const learn_t *self, char *out_list, size_t size) {
 }
 
 static void doubt_role(learn_findings_t *out, const char *why, const char *fix) {
-    (void)learn_say(out, '?', "current_role", LEARN_BOTH, "current role: %s%s", why, fix);
+    (void)learn_print(out, '?', "current_role", LEARN_BOTH, "current role: %s%s", why, fix);
 }
 
 /// Judges the role limit: with it, both wheels are at standstill with speed 0 and a current.
@@ -167,7 +170,7 @@ static void weigh_limit(const learn_t *self, learn_findings_t *out) {
     const bool stood_left = left->stood_us >= LEARN_SHOWN_MIN_US && left->ran_us * 10 < left->stood_us;
     const bool stood_right = right->stood_us >= LEARN_SHOWN_MIN_US && right->ran_us * 10 < right->stood_us;
     if (ran != NULL) {
-        (void)learn_say(
+        (void)learn_print(
             out, '-', "current_role", LEARN_BOTH,
             "current role: every speed has the same positive current, but with speed 0 %s turned for longer "
             "than a second: no limit?",
@@ -180,9 +183,9 @@ static void weigh_limit(const learn_t *self, learn_findings_t *out) {
             "record their speed frames, and leave them at standstill for seconds");
     } else {
         learn_finding_t *finding =
-            learn_say(out, '+', "current_role", LEARN_BOTH,
-                      "current_role = limit: every speed has the same positive current, also 0 and backwards, and "
-                      "with 0 the wheels are at standstill");
+            learn_print(out, '+', "current_role", LEARN_BOTH,
+                        "current_role = limit: every speed has the same positive current, also 0 and backwards, and "
+                        "with 0 the wheels are at standstill");
         (void)snprintf(finding->value, sizeof finding->value, "limit");
     }
 }
@@ -212,8 +215,8 @@ static void weigh_role(const learn_t *self, bool own, learn_findings_t *out) {
         weigh_limit(self, out);
     } else {
         learn_finding_t *finding =
-            learn_say(out, '+', "current_role", LEARN_BOTH,
-                      "current_role = setpoint: the current has the sign of the speed, and is 0 with speed 0");
+            learn_print(out, '+', "current_role", LEARN_BOTH,
+                        "current_role = setpoint: the current has the sign of the speed, and is 0 with speed 0");
         (void)snprintf(finding->value, sizeof finding->value, "setpoint");
     }
 }
@@ -225,16 +228,16 @@ static void weigh_length(const learn_t *self, learn_findings_t *out) {
         self->setpoint[IW_LEFT].count >= LEARN_FRAMES_MIN && self->setpoint[IW_RIGHT].count >= LEARN_FRAMES_MIN;
     const bool one = left->low == left->high && right->low == left->low && right->high == left->low;
     if (!enough) {
-        (void)learn_say(out, '?', "setpoint_dlc", LEARN_BOTH,
-                        "length of setpoints: fewer than %u for each wheel; record a longer drive of both",
-                        LEARN_FRAMES_MIN);
+        (void)learn_print(out, '?', "setpoint_dlc", LEARN_BOTH,
+                          "length of setpoints: fewer than %u for each wheel; record a longer drive of both",
+                          LEARN_FRAMES_MIN);
     } else if (!one || left->low < (int32_t)IW_DLC_SETPOINT || left->low > (int32_t)IW_CAN_DATA_MAX) {
-        (void)learn_say(out, '?', "setpoint_dlc", LEARN_BOTH,
-                        "length of setpoints: they differ or are not valid, so the right length is not known");
+        (void)learn_print(out, '?', "setpoint_dlc", LEARN_BOTH,
+                          "length of setpoints: they differ or are not valid, so the right length is not known");
     } else {
         learn_finding_t *finding =
-            learn_say(out, (left->low == (int32_t)IW_DLC_SETPOINT) ? '+' : '-', "setpoint_dlc", LEARN_BOTH,
-                      "every setpoint has %" PRId32 " bytes (document: %u)", left->low, (unsigned)IW_DLC_SETPOINT);
+            learn_print(out, (left->low == (int32_t)IW_DLC_SETPOINT) ? '+' : '-', "setpoint_dlc", LEARN_BOTH,
+                        "every setpoint has %" PRId32 " bytes (document: %u)", left->low, (unsigned)IW_DLC_SETPOINT);
         (void)snprintf(finding->value, sizeof finding->value, "%" PRId32, left->low);
     }
 }
@@ -243,7 +246,7 @@ void learn_weigh_setpoints(const learn_t *self, learn_findings_t *out_findings) 
     const uint64_t count = self->setpoint[IW_LEFT].count + self->setpoint[IW_RIGHT].count;
     const uint64_t sent = self->setpoint[IW_LEFT].sent + self->setpoint[IW_RIGHT].sent;
     if (count == 0U) {
-        (void)learn_say(
+        (void)learn_print(
             out_findings, '?', "setpoint_type", LEARN_BOTH,
             "setpoint type and current role: the recording has no setpoint (266 = 0x10A, 298 = 0x12A); record while "
             "the other controller drives");

@@ -58,7 +58,7 @@ static const char *no_sign(const learn_t *self, unsigned side) {
 }
 
 /// Writes "a positive setpoint is measured as a positive speed" for a commanded direction and its sign.
-static void say_direction(bool forward, int sign, char *out_text, size_t size) {
+static void format_direction(bool forward, int sign, char *out_text, size_t size) {
     const char *measured = (sign > 0) ? (forward ? "positive" : "negative") : (forward ? "NEGATIVE" : "POSITIVE");
     (void)snprintf(out_text, size, "a %s setpoint is measured as a %s speed", forward ? "positive" : "negative",
                    measured);
@@ -73,70 +73,71 @@ static void weigh_sign(const learn_t *self, unsigned side, learn_findings_t *out
     char ahead[80];
     char back[80];
     if (!forward && !backward) {
-        (void)learn_say(out, '?', "feedback_sign", side, "%s sign of the speed: %s", text_side(side),
-                        no_sign(self, side));
+        (void)learn_print(out, '?', "feedback_sign", side, "%s sign of the speed: %s", text_side(side),
+                          no_sign(self, side));
         return;
     }
     if (first == 0 || first != second) {
-        (void)learn_say(out, '-', "feedback_sign", side,
-                        "%s: the measured speed has sometimes the sign of the setpoint, sometimes the opposite one",
-                        text_side(side));
+        (void)learn_print(out, '-', "feedback_sign", side,
+                          "%s: the measured speed has sometimes the sign of the setpoint, sometimes the opposite one",
+                          text_side(side));
         return;
     }
-    say_direction(forward, first, ahead, sizeof ahead);
-    say_direction(false, first, back, sizeof back);
-    learn_finding_t *finding = learn_say(out, (first > 0) ? '+' : '-', "feedback_sign", side, "%s: %s%s%s%s",
-                                         text_side(side), ahead, (forward && backward) ? ", " : "",
-                                         (forward && backward) ? back : " (the other direction: not recorded)",
-                                         (first > 0) ? "" : "; the gateway would latch feedback_sign");
+    format_direction(forward, first, ahead, sizeof ahead);
+    format_direction(false, first, back, sizeof back);
+    learn_finding_t *finding = learn_print(out, (first > 0) ? '+' : '-', "feedback_sign", side, "%s: %s%s%s%s",
+                                           text_side(side), ahead, (forward && backward) ? ", " : "",
+                                           (forward && backward) ? back : " (the other direction: not recorded)",
+                                           (first > 0) ? "" : "; the gateway would latch feedback_sign");
     (void)snprintf(finding->value, sizeof finding->value, "%s", (first > 0) ? "yes" : "no");
 }
 
 /// Compares the commanded speed with the measured rpm.
 static void weigh_scale(const learn_wheel_t *wheel, unsigned side, learn_findings_t *out) {
     if (!learn_turned(wheel) || wheel->steady_rpm == 0) {
-        (void)learn_say(out, '?', "speed_scale", side,
-                        "%s mm/s per rpm: the recording does not show it turning for half a second at a steady command "
-                        "of 100 mm/s or more",
-                        text_side(side));
+        (void)learn_print(
+            out, '?', "speed_scale", side,
+            "%s mm/s per rpm: the recording does not show it turning for half a second at a steady command "
+            "of 100 mm/s or more",
+            text_side(side));
         return;
     }
     const int64_t um_s = wheel->steady_mm_s * 1000 / wheel->steady_rpm;
     const int64_t off_us = wheel->steady_us - wheel->steady_fit_us;
     if (nearly_all(wheel->steady_fit_us, wheel->steady_us)) {
-        (void)learn_say(out, '+', "speed_scale", side,
-                        "%s: %" PRId64 ".%03" PRId64
-                        " mm/s of setpoint per measured rpm; 20.106 is expected with 192 mm and rpm of the wheel",
-                        text_side(side), um_s / 1000, um_s % 1000);
+        (void)learn_print(out, '+', "speed_scale", side,
+                          "%s: %" PRId64 ".%03" PRId64
+                          " mm/s of setpoint per measured rpm; 20.106 is expected with 192 mm and rpm of the wheel",
+                          text_side(side), um_s / 1000, um_s % 1000);
     } else if (nearly_all(off_us, wheel->steady_us)) {
-        (void)learn_say(out, '-', "speed_scale", side,
-                        "%s: %" PRId64 ".%03" PRId64
-                        " mm/s of setpoint per measured rpm; 20.106 is expected with 192 mm and rpm of the wheel: "
-                        "another gear (rpm_of, gear_ratio), another radius, or it did not follow",
-                        text_side(side), um_s / 1000, um_s % 1000);
+        (void)learn_print(out, '-', "speed_scale", side,
+                          "%s: %" PRId64 ".%03" PRId64
+                          " mm/s of setpoint per measured rpm; 20.106 is expected with 192 mm and rpm of the wheel: "
+                          "another gear (rpm_of, gear_ratio), another radius, or it did not follow",
+                          text_side(side), um_s / 1000, um_s % 1000);
     } else {
-        (void)learn_say(out, '?', "speed_scale", side,
-                        "%s mm/s per rpm: the wheel had its commanded speed only part of the time", text_side(side));
+        (void)learn_print(out, '?', "speed_scale", side,
+                          "%s mm/s per rpm: the wheel had its commanded speed only part of the time", text_side(side));
     }
 }
 
 static void weigh_ticks(const learn_wheel_t *wheel, unsigned side, learn_findings_t *out) {
     if (wheel->turned_rpm_us < (int64_t)TURNS_MIN * US_PER_MIN) {
-        (void)learn_say(out, '?', "ticks_per_turn", side, "%s ticks per turn: %s", text_side(side),
-                        (wheel->statuses == 0U) ? "the recording has none of its status frames"
-                        : (wheel->speeds == 0U)
-                            ? "the recording has none of its speed frames"
-                            : "the recording has fewer than two turns at 10 rpm or more without a gap");
+        (void)learn_print(out, '?', "ticks_per_turn", side, "%s ticks per turn: %s", text_side(side),
+                          (wheel->statuses == 0U) ? "the recording has none of its status frames"
+                          : (wheel->speeds == 0U)
+                              ? "the recording has none of its speed frames"
+                              : "the recording has fewer than two turns at 10 rpm or more without a gap");
         return;
     }
     const uint64_t tenths = wheel->ticks * 10U * US_PER_MIN / (uint64_t)wheel->turned_rpm_us;
     const bool same = tenths >= 540U && tenths <= 660U;
-    (void)learn_say(out, same ? '+' : '-', "ticks_per_turn", side,
-                    "%s: %" PRIu64 ".%" PRIu64 " ticks per turn by the rpm; %s", text_side(side), tenths / 10U,
-                    tenths % 10U,
-                    same              ? "a rotor has 60, so the rpm are the rotor's, or there is no gear"
-                    : (tenths > 660U) ? "a rotor has 60, so there is a gear: gear_ratio"
-                                      : "a rotor has 60, and no gear results in fewer: were frames lost?");
+    (void)learn_print(out, same ? '+' : '-', "ticks_per_turn", side,
+                      "%s: %" PRIu64 ".%" PRIu64 " ticks per turn by the rpm; %s", text_side(side), tenths / 10U,
+                      tenths % 10U,
+                      same              ? "a rotor has 60, so the rpm are the rotor's, or there is no gear"
+                      : (tenths > 660U) ? "a rotor has 60, so there is a gear: gear_ratio"
+                                        : "a rotor has 60, and no gear results in fewer: were frames lost?");
 }
 
 /// Returns what is missing for a ratio of force and offset; NULL: nothing.
@@ -175,7 +176,7 @@ static void weigh_force(const learn_wheel_t *wheel, unsigned side, learn_finding
     const char *documented = (side == IW_LEFT) ? "cN" : "dN";
     const char *missing = no_force(wheel);
     if (missing != NULL) {
-        (void)learn_say(out, '?', "force_unit", side, "%s force unit: %s", text_side(side), missing);
+        (void)learn_print(out, '?', "force_unit", side, "%s force unit: %s", text_side(side), missing);
         return;
     }
     const int64_t permille =
@@ -185,33 +186,33 @@ static void weigh_force(const learn_wheel_t *wheel, unsigned side, learn_finding
     const bool is_unit = unit != NULL && unit[1] == 'N';
     const bool dead = wheel->force.low == wheel->force.high;
     learn_finding_t *finding =
-        learn_say(out, (is_unit && unit[0] == documented[0]) ? '+' : '-', "force_unit", side,
-                  "%s force at standstill / offset = %s%" PRId64 ".%02" PRId64 ": %s%s (document: %s)", text_side(side),
-                  (permille < 0) ? "-" : "", size / 1000, size % 1000 / 10,
-                  (unit == NULL) ? "neither cN (10) nor dN (1) nor offset removed (0): pressed at the start?"
-                  : is_unit      ? unit
-                  : dead         ? "the wheel subtracts the offset itself, or its force never changes"
-                                 : "the wheel subtracts the offset itself",
-                  is_unit ? " per count, if nothing pressed the handle" : "", documented);
+        learn_print(out, (is_unit && unit[0] == documented[0]) ? '+' : '-', "force_unit", side,
+                    "%s force at standstill / offset = %s%" PRId64 ".%02" PRId64 ": %s%s (document: %s)",
+                    text_side(side), (permille < 0) ? "-" : "", size / 1000, size % 1000 / 10,
+                    (unit == NULL) ? "neither cN (10) nor dN (1) nor offset removed (0): pressed at the start?"
+                    : is_unit      ? unit
+                    : dead         ? "the wheel subtracts the offset itself, or its force never changes"
+                                   : "the wheel subtracts the offset itself",
+                    is_unit ? " per count, if nothing pressed the handle" : "", documented);
     (void)snprintf(finding->value, sizeof finding->value, "%s", is_unit ? unit : "");
 }
 
 static void weigh_pose(const learn_pose_t *pose, learn_findings_t *out) {
     const bool enough = pose->moves >= POSE_MOVES_MIN && pose->way_big + pose->way_little >= POSE_WAY_MIN;
     if (!enough) {
-        (void)learn_say(out, '?', "pose_byte_order", LEARN_BOTH, "byte order of the pose: %s",
-                        (pose->count == 0U) ? "the recording has no pose frame (290 = 0x122)" : "it hardly changes");
+        (void)learn_print(out, '?', "pose_byte_order", LEARN_BOTH, "byte order of the pose: %s",
+                          (pose->count == 0U) ? "the recording has no pose frame (290 = 0x122)" : "it hardly changes");
     } else if (pose->way_big * 4U < pose->way_little) {
-        learn_finding_t *finding = learn_say(out, '+', "pose_byte_order", LEARN_BOTH,
-                                             "the pose is smooth with the most significant byte first");
+        learn_finding_t *finding = learn_print(out, '+', "pose_byte_order", LEARN_BOTH,
+                                               "the pose is smooth with the most significant byte first");
         (void)snprintf(finding->value, sizeof finding->value, "yes");
     } else if (pose->way_little * 4U < pose->way_big) {
-        learn_finding_t *finding = learn_say(
+        learn_finding_t *finding = learn_print(
             out, '-', "pose_byte_order", LEARN_BOTH,
             "the pose is smooth with the LEAST significant byte first: the gateway reads it in the other order");
         (void)snprintf(finding->value, sizeof finding->value, "no");
     } else {
-        (void)learn_say(out, '?', "pose_byte_order", LEARN_BOTH, "byte order of the pose: smooth in neither order");
+        (void)learn_print(out, '?', "pose_byte_order", LEARN_BOTH, "byte order of the pose: smooth in neither order");
     }
 }
 

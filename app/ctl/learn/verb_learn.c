@@ -111,7 +111,7 @@ static void print_drives(const learn_drives_t *self, int64_t first_us) {
     if (self->count > 0U) {
         (void)puts("\nDrives    begins at    lasts  leaves its path by up to");
     }
-    for (uint32_t i = 0; i < learn_drives_told(self); i++) {
+    for (uint32_t i = 0; i < learn_drives_printed(self); i++) {
         const learn_drive_t *each = &self->drive[i];
         (void)printf("  %4" PRIu32 "  %9.1f s  %5.1f s  ", i + 1U, (double)(each->begin_us - first_us) / 1e6,
                      (double)(each->end_us - each->begin_us) / 1e6);
@@ -274,7 +274,7 @@ static json_t *ids(const learn_id_t *from, unsigned count) {
 
 static json_t *drives_of(const learn_drives_t *self) {
     json_t *list = json_array();
-    for (uint32_t i = 0; i < learn_drives_told(self); i++) {
+    for (uint32_t i = 0; i < learn_drives_printed(self); i++) {
         const learn_drive_t *each = &self->drive[i];
         (void)json_array_append_new(list, json_pack("{s:I,s:I,s:o}", "begin_us", (json_int_t)each->begin_us, "end_us",
                                                     (json_int_t)each->end_us, "deviation_mm",
@@ -288,14 +288,15 @@ static json_t *drives_of(const learn_drives_t *self) {
 static bool report_json(const study_t *study, const char *name) {
     const learn_t *self = &study->learn;
     json_t *suggested = json_object();
-    json_t *root = json_pack(
-        "{s:s,s:o,s:I,s:{s:o,s:o},s:{s:o,s:o},s:o,s:o,s:o,s:o,s:I,s:o,s:o}", "file", name, "frames",
-        number(self->frames), "duration_us", (json_int_t)(self->last_us - self->first_us), "setpoints", "left",
-        setpoints(self, IW_LEFT), "right", setpoints(self, IW_RIGHT), "wheels", "left", wheel(&self->wheel[IW_LEFT]),
-        "right", wheel(&self->wheel[IW_RIGHT]), "telemetry", ids(&self->known[IW_SIDES], LEARN_IDS - IW_SIDES),
-        "other_ids", ids(self->other, self->others), "more_others", number(self->more_others), "drives",
-        drives_of(&study->drives), "more_drives", (json_int_t)(study->drives.count - learn_drives_told(&study->drives)),
-        "findings", findings_of(&study->findings, suggested), "suggested", suggested);
+    json_t *root =
+        json_pack("{s:s,s:o,s:I,s:{s:o,s:o},s:{s:o,s:o},s:o,s:o,s:o,s:o,s:I,s:o,s:o}", "file", name, "frames",
+                  number(self->frames), "duration_us", (json_int_t)(self->last_us - self->first_us), "setpoints",
+                  "left", setpoints(self, IW_LEFT), "right", setpoints(self, IW_RIGHT), "wheels", "left",
+                  wheel(&self->wheel[IW_LEFT]), "right", wheel(&self->wheel[IW_RIGHT]), "telemetry",
+                  ids(&self->known[IW_SIDES], LEARN_IDS - IW_SIDES), "other_ids", ids(self->other, self->others),
+                  "more_others", number(self->more_others), "drives", drives_of(&study->drives), "more_drives",
+                  (json_int_t)(study->drives.count - learn_drives_printed(&study->drives)), "findings",
+                  findings_of(&study->findings, suggested), "suggested", suggested);
     if (root == NULL) {
         return false;
     }

@@ -21,7 +21,7 @@
 
 /// Interval at which the file is flushed, so that other programs can read it.
 #define FLUSH_US 1000000
-#define LOOK_US  500000
+#define POLL_US  500000
 /// Longest time in which an interface must come up.
 #define UP_US   1000000
 #define WAIT_MS 50
@@ -146,9 +146,9 @@ static int record_gateway(ctl_t *ctl, recorder_t *self) {
     bool written = true;
     while (code == CTL_OK && written && client_now_us() < self->end_us) {
         json_t *line = NULL;
-        const int64_t look_us = client_now_us() + LOOK_US;
+        const int64_t poll_us = client_now_us() + POLL_US;
         const iwc_result_t result =
-            client_receive(&ctl->client, (look_us < self->end_us) ? look_us : self->end_us, &line);
+            client_receive(&ctl->client, (poll_us < self->end_us) ? poll_us : self->end_us, &line);
         written = result != IWC_OK || take_event(self, line);
         written = poll_recorder(self) && written;
         json_decref(line);
@@ -254,7 +254,7 @@ static int record_bus(const char *bus, recorder_t *self) {
 /// Records from the gateway if there is one for this bus: it also distinguishes its own frames from those of others.
 static int record(ctl_t *ctl, const words_t *words, recorder_t *self) {
     near_gateway_t gateway = {0};
-    near_look(ctl, words->bus, &gateway);
+    near_find(ctl, words->bus, &gateway);
     json_decref(gateway.status);
     if (gateway.result == NEAR_FOUND) {
         name_interface(self, gateway.bus);

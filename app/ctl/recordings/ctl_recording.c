@@ -40,7 +40,7 @@ static bool is_ours(const char *path) {
 static bool connected(ctl_t *ctl) {
     if (!ctl->client.open) {
         near_gateway_t gateway = {0};
-        near_look(ctl, NULL, &gateway);
+        near_find(ctl, NULL, &gateway);
         json_decref(gateway.status);
     }
     return ctl->client.open;
@@ -148,9 +148,9 @@ int recording_open(recording_t *self, ctl_t *ctl, const char *path) {
 
 static void report_bad(recording_t *self) {
     self->bad++;
-    if (self->bad <= RECORDING_TOLD_MAX) {
+    if (self->bad <= RECORDING_PRINTED_MAX) {
         (void)ctl_fail(CTL_DATA, "%s:%" PRIu64 ": %s", self->name, self->reader.line, self->reader.why);
-    } else if (self->bad == RECORDING_TOLD_MAX + 1U) {
+    } else if (self->bad == RECORDING_PRINTED_MAX + 1U) {
         (void)ctl_fail(CTL_DATA, "%s: more bad lines follow; they are counted, not printed", self->name);
     }
 }
@@ -256,9 +256,9 @@ bool recording_is_drained(const recording_t *self) {
 static void report_clock(const recording_t *self) {
     if (self->steps + self->wrong_stamps > 0U) {
         (void)ctl_fail(CTL_OK,
-                       "%s: the clock was set: %" PRIu64 " times, and %" PRIu64
-                       " single times are wrong, first in line %" PRIu64 "; each such frame follows the one before it "
-                       "without a pause",
+                       "%s: the clock was set %" PRIu64 " times, and %" PRIu64
+                       " single times are wrong, first in line %" PRIu64 "; each such frame is placed directly "
+                       "after the one before it",
                        self->name, self->steps, self->wrong_stamps, self->first_step);
     }
 }
@@ -268,7 +268,7 @@ int recording_close(recording_t *self) {
     if (self->fd > STDERR_FILENO) {
         (void)close(self->fd);
     }
-    if (self->reader.failed) {
+    if (self->reader.source == CANDUMP_BROKEN) {
         return ctl_fail(CTL_DATA, "%s: cannot be read further than line %" PRIu64 ": %s", self->name, self->reader.line,
                         strerror(error));
     }

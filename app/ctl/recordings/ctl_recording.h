@@ -17,7 +17,7 @@
 #include <stdio.h>
 
 /// Maximum number of bad lines that are reported one by one.
-#define RECORDING_TOLD_MAX 10U
+#define RECORDING_PRINTED_MAX 10U
 
 typedef struct {
     const char *name;     ///< Name in messages.

@@ -10,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define TOLD_MAX 10U
+#define PRINTED_MAX 10U
 
 static int64_t integer(const json_t *line, const char *name) {
     return json_integer_value(json_object_get(line, name));
@@ -177,7 +177,7 @@ static json_t *next_line(events_t *self, bool *out_end) {
     json_t *line = json_loadb(self->line, (size_t)length, 0, &error);
     if (line == NULL) {
         self->bad++;
-        if (self->bad <= TOLD_MAX) {
+        if (self->bad <= PRINTED_MAX) {
             (void)ctl_fail(CTL_DATA, "%s:%" PRIu64 ": not a JSON object (%s); left out: is the file cut?", self->name,
                            self->number, error.text);
         }
@@ -237,7 +237,7 @@ bool events_next(events_t *self, blackbox_entry_t *out_entry, uint64_t *out_fram
         const bool good = line != NULL && take_entry(self, line, out_entry, out_frames);
         if (line != NULL && !good && !take_other(self, line)) {
             self->bad++;
-            if (self->bad <= TOLD_MAX) {
+            if (self->bad <= PRINTED_MAX) {
                 (void)ctl_fail(CTL_DATA, "%s:%" PRIu64 ": not an entry of a recording; left out", self->name,
                                self->number);
             }

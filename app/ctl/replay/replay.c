@@ -95,7 +95,7 @@ static int port_estop(void *context) {
     return ((const replay_t *)context)->estop;
 }
 
-iw_snapshot_t replay_look(const replay_t *self) {
+iw_snapshot_t replay_snapshot(const replay_t *self) {
     iw_snapshot_t seen;
     iw_gateway_snapshot(&self->gateway, self->now_us, &seen);
     return seen;
@@ -111,7 +111,7 @@ static void begin_core(replay_t *self, const iw_config_t *config, iw_time_us_t a
     (void)iw_gateway_init(&self->gateway, config, &hal, at_us, restarted);
     self->now_us = at_us;
     self->next_us = at_us;
-    const iw_snapshot_t seen = replay_look(self);
+    const iw_snapshot_t seen = replay_snapshot(self);
     self->state = seen.state;
     memcpy(self->assumptions, seen.assumed, sizeof self->assumptions);
     for (size_t side = 0; side < IW_SIDES; side++) {
@@ -201,7 +201,7 @@ static void tare(replay_t *self, const blackbox_entry_t *entry) {
 
 /// Compares a recorded decision with the present one.
 static void compare(replay_t *self, const blackbox_entry_t *entry) {
-    const iw_stop_t *stop = replay_look(self).stop;
+    const iw_stop_t *stop = replay_snapshot(self).stop;
     const bool is_state = entry->kind == (uint8_t)BLACKBOX_STATE;
     const bool same = is_state ? (uint8_t)iw_gateway_state(&self->gateway) == entry->a
                                : (uint8_t)stop->cause == entry->a && stop->sides == entry->b &&
@@ -297,7 +297,7 @@ static int16_t obedient_rpm(const replay_t *self, size_t side, const iw_can_fram
     if (setpoint == NULL || iw_codec_decode(setpoint, values) != IW_CODEC_SETPOINT) {
         return 0;
     }
-    return (int16_t)(values[side].setpoint.speed_mm_s * 1000 / (int32_t)replay_look(self).wheel[side].um_s_per_rpm);
+    return (int16_t)(values[side].setpoint.speed_mm_s * 1000 / (int32_t)replay_snapshot(self).wheel[side].um_s_per_rpm);
 }
 
 /// Runs a cycle of the simulated bus: both wheels show the speed of their last setpoint.
@@ -330,7 +330,7 @@ static iw_time_us_t ramp_us(const iw_config_t *config, const blackbox_drive_t *d
 }
 
 static void continue_driving(replay_t *self, const blackbox_entry_t *state, iw_time_us_t at_us) {
-    const iw_config_t *config = replay_look(self).config;
+    const iw_config_t *config = replay_snapshot(self).config;
     iw_drive_t wanted = {.has_current = config->current_role == IW_ROLE_SETPOINT};
     iw_applied_t applied;
     for (size_t side = 0; side < IW_SIDES; side++) {
@@ -343,7 +343,7 @@ static void continue_driving(replay_t *self, const blackbox_entry_t *state, iw_t
 /// Arms for the recorded holder, and drives up to the time of `state`, so that the ramp is complete.
 static void drive_up(replay_t *self, const blackbox_entry_t *state, iw_time_us_t from_us) {
     iw_can_frame_t last[IW_SIDES] = {0};
-    const iw_time_us_t rest_us = (iw_time_us_t)replay_look(self).config->rest_ms * IW_US_PER_MS;
+    const iw_time_us_t rest_us = (iw_time_us_t)replay_snapshot(self).config->rest_ms * IW_US_PER_MS;
     const bool moves = state->a != (uint8_t)IW_STATE_LISTENING;
     bool asked = false;
     for (iw_time_us_t at_us = from_us; at_us < state->at_us; at_us += PERIOD_US) {

@@ -101,7 +101,7 @@ void replay_step(replay_t *self, iw_time_us_t at_us);
 void replay_event(replay_t *self, const blackbox_entry_t *entry);
 
 /// Returns the snapshot after the last step.
-iw_snapshot_t replay_look(const replay_t *self);
+iw_snapshot_t replay_snapshot(const replay_t *self);
 
 /// Prints a summary: the number of inputs, and the comparison with the recording.
 void replay_finish(const replay_t *self);

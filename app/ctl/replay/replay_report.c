@@ -87,7 +87,7 @@ static void report_wheels(replay_t *self, const iw_snapshot_t *seen) {
     }
 }
 
-static void tell_assumptions(replay_t *self, const iw_snapshot_t *seen) {
+static void report_assumptions(replay_t *self, const iw_snapshot_t *seen) {
     for (unsigned item = 0; item < IW_ASSUMPTION_ITEMS; item++) {
         const iw_assumption_entry_t *entry = &seen->assumed[item];
         if (entry->state != self->assumptions[item].state) {
@@ -140,9 +140,9 @@ static void report_state(replay_t *self, iw_state_t state) {
 }
 
 void replay_report_step(replay_t *self) {
-    const iw_snapshot_t seen = replay_look(self);
+    const iw_snapshot_t seen = replay_snapshot(self);
     report_wheels(self, &seen);
-    tell_assumptions(self, &seen);
+    report_assumptions(self, &seen);
     report_causes(self, seen.present);
     report_stop(self, seen.stop);
     report_arming(self, &seen);
@@ -222,7 +222,7 @@ void replay_report_difference(const replay_t *self, const blackbox_entry_t *entr
         report(self, entry->at_us, "DIFFERENT", "state %s, when it was recorded %s",
                iwn_state_name(iw_gateway_state(&self->gateway)), iwn_state_name((iw_state_t)entry->a));
     } else {
-        const iw_stop_t *stop = replay_look(self).stop;
+        const iw_stop_t *stop = replay_snapshot(self).stop;
         report(self, entry->at_us, "DIFFERENT", "last stop %s (%u), when it was recorded %s (%" PRId64 ")",
                iwn_cause_name(stop->cause), (unsigned)stop->detail, iwn_cause_name((iw_cause_t)entry->a),
                entry->as.value);
@@ -258,7 +258,7 @@ static void sum_up_as_json(const replay_t *self) {
     put_object(&self->out,
                json_pack("{s:s,s:s,s:I,s:I,s:I,s:o}", "event", "summary", "state",
                          iwn_state_name(iw_gateway_state(&self->gateway)), "stops",
-                         (json_int_t)replay_look(self).stop->number, "frames", (json_int_t)self->total_frames,
+                         (json_int_t)replay_snapshot(self).stop->number, "frames", (json_int_t)self->total_frames,
                          "setpoint_frames", (json_int_t)self->total_sent, "as_recorded", compared));
 }
 
@@ -270,7 +270,7 @@ void replay_finish(const replay_t *self) {
         sum_up_as_json(self);
         return;
     }
-    const uint32_t stops = replay_look(self).stop->number;
+    const uint32_t stops = replay_snapshot(self).stop->number;
     replay_note(&self->out, "end: %s, %u stop%s, %" PRIu64 " frames in, %" PRIu64 " setpoint frames out",
                 iwn_state_name(iw_gateway_state(&self->gateway)), (unsigned)stops, (stops == 1U) ? "" : "s",
                 self->total_frames, self->total_sent);

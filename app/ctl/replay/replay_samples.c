@@ -32,7 +32,7 @@ void replay_samples_frame(replay_t *self, const iw_can_frame_t *frame) {
     }
     const iw_side_t side = iw_codec_side(frame->id);
     const int16_t speed_mm_s = values[side].setpoint.speed_mm_s;
-    const bool mirrored = replay_look(self).config->invert[side];
+    const bool mirrored = replay_snapshot(self).config->invert[side];
     self->samples.speed_mm_s[side] = (mirrored && speed_mm_s != INT16_MIN) ? (int16_t)-speed_mm_s : speed_mm_s;
     self->samples.at_us[side] = self->now_us;
     self->samples.known[side] = true;
@@ -70,7 +70,7 @@ void replay_samples_step(replay_t *self) {
     if (self->out.samples_us == 0U || self->quiet || self->now_us < self->samples.due_us) {
         return;
     }
-    const iw_snapshot_t seen = replay_look(self);
+    const iw_snapshot_t seen = replay_snapshot(self);
     self->samples.due_us = self->now_us - self->now_us % self->out.samples_us + self->out.samples_us;
     put_begin(self, self->now_us);
     put_wheel(self, &seen, IW_LEFT);

@@ -241,8 +241,8 @@ static iw_time_us_t pass_time(verb_replay_t *self, iw_time_us_t at_us) {
     }
     if (at_us - replay->now_us > GAP_US) {
         const iw_time_us_t cut_us = at_us - replay->now_us - GAP_US;
-        replay_note(&self->out, "nothing for %" PRIu64 " s; cut to %u s", (at_us - replay->now_us) / 1000000U,
-                    GAP_US / 1000000U);
+        replay_note(&self->out, "no frames for %" PRIu64 " s; the gap is shortened to %u s",
+                    (at_us - replay->now_us) / 1000000U, GAP_US / 1000000U);
         self->cut_us += cut_us;
         replay->out.wall_less_us += (int64_t)cut_us;
         at_us -= cut_us;
@@ -287,7 +287,7 @@ static int finish(verb_replay_t *self) {
     }
     if (self->events.lost > 0U || (self->events.file != NULL && !self->events.whole)) {
         replay_note(&self->out, "the recording is incomplete: %" PRIu64 " entries are missing%s", self->events.lost,
-                    self->events.whole ? "" : ", also its end");
+                    self->events.whole ? "" : ", and its end is missing too");
     }
     const bool bad = self->events.bad > 0U;
     events_close(&self->events);

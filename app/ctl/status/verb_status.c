@@ -31,12 +31,12 @@ static void draw_state(const paper_t *paper, const json_t *status, const json_t 
     advice_t advice;
     advice_collect(status, &advice);
     paper_label(paper, "STATE");
-    paper_say(paper, state_tone(state), "%.32s", json_is_true(get(status, "arming")) ? "arming" : state);
+    paper_print(paper, state_tone(state), "%.32s", json_is_true(get(status, "arming")) ? "arming" : state);
     if (json_is_string(get(status, "cause"))) {
-        paper_say(paper, state_tone(state), " (%.32s)", text_word(status, "cause"));
+        paper_print(paper, state_tone(state), " (%.32s)", text_word(status, "cause"));
     }
     if (json_is_true(get(status, "holding"))) {
-        paper_say(paper, TONE_CARE, ", holding");
+        paper_print(paper, TONE_CARE, ", holding");
     }
     paper_end(paper);
     for (unsigned i = 0; i < advice.lines; i++) {
@@ -152,8 +152,8 @@ static void write_value(const value_t *value, const json_t *wheel, char number[T
     (void)snprintf(number, TEXT_CELL, "%.32s%s%s", age, is(age, "--") ? "" : " ", is(age, "--") ? "" : value->unit);
 }
 
-/// Writes the word that explains the values. For an offset, also the origin of a stored one, and whether it was measured
-/// under load.
+/// Writes the word that explains the values. The remark of an offset also contains the origin of a stored offset, and
+/// whether the offset was measured under load.
 static void write_remark(const row_t *row, const json_t *wheel, char remark[TEXT_CELL]) {
     const char *word = (row->remark != NULL) ? text_word(wheel, row->remark) : "";
     const bool zero = row->remark != NULL && is(row->remark, "offset_provenance");
@@ -210,9 +210,9 @@ static void draw_pose(const paper_t *paper, const json_t *pose) {
     paper_label(paper, "POSE");
     for (size_t i = 0; i < 4; i++) {
         text_integer(get(pose, fields[i]), (i < 3) ? "mm" : "mrad", number);
-        paper_say(paper, TONE_PLAIN, "%s%s %s", (i > 0) ? ", " : "", names[i], number);
+        paper_print(paper, TONE_PLAIN, "%s%s %s", (i > 0) ? ", " : "", names[i], number);
     }
-    paper_say(paper, TONE_CARE, "%s", json_is_true(get(pose, "limited")) ? ", AT THE END OF ITS RANGE" : "");
+    paper_print(paper, TONE_CARE, "%s", json_is_true(get(pose, "limited")) ? ", AT THE END OF ITS RANGE" : "");
     paper_end(paper);
 }
 
@@ -269,7 +269,8 @@ static void draw_budget(const paper_t *paper, const json_t *budget) {
         text_integer(get(budget, cases[i][1]), "ms", time);
         text_decimal(get(budget, cases[i][2]), 3, "m", way);
         paper_label(paper, (i == 0) ? "STOP BUDGET" : "");
-        paper_say(paper, TONE_PLAIN, "%s: at most %s, %s%s", cases[i][0], time, way, (i == 0) ? "" : ", then unknown");
+        paper_print(paper, TONE_PLAIN, "%s: at most %s, %s%s", cases[i][0], time, way,
+                    (i == 0) ? "" : ", then unknown");
         paper_end(paper);
     }
 }
@@ -282,7 +283,7 @@ static void draw_pair(const paper_t *paper, const json_t *pair) {
         text_integer(get(pair, "largest_mm"), "mm", largest);
         text_integer(get(pair, "limit_mm"), "mm", limit);
         paper_label(paper, "PAIR");
-        paper_say(paper, TONE_PLAIN, "largest deviation of the last drive: %s; stop at %s", largest, limit);
+        paper_print(paper, TONE_PLAIN, "largest deviation of the last drive: %s; stop at %s", largest, limit);
         paper_end(paper);
     }
 }

@@ -31,29 +31,36 @@ typedef struct {
 
 typedef int (*ctl_verb_t)(ctl_t *self, int count, char **words);
 
-int verb_status(ctl_t *self, int count, char **words);
-int verb_watch(ctl_t *self, int count, char **words);
-int verb_drive(ctl_t *self, int count, char **words);
-int verb_stop(ctl_t *self, int count, char **words);
-int verb_estop(ctl_t *self, int count, char **words);
-int verb_reset(ctl_t *self, int count, char **words);
-int verb_release(ctl_t *self, int count, char **words);
-int verb_tare(ctl_t *self, int count, char **words);
-int verb_why(ctl_t *self, int count, char **words);
-int verb_ledger(ctl_t *self, int count, char **words);
-int verb_confirm(ctl_t *self, int count, char **words);
-int verb_config(ctl_t *self, int count, char **words);
-int verb_doctor(ctl_t *self, int count, char **words);
-int verb_learn(ctl_t *self, int count, char **words);
-int verb_record(ctl_t *self, int count, char **words);
-int verb_replay(ctl_t *self, int count, char **words);
-int verb_decode(ctl_t *self, int count, char **words);
-int verb_bringup(ctl_t *self, int count, char **words);
-int verb_top(ctl_t *self, int count, char **words);
-int verb_web(ctl_t *self, int count, char **words);
-int verb_fleet(ctl_t *self, int count, char **words);
-int verb_export(ctl_t *self, int count, char **words);
-int verb_help(ctl_t *self, int count, char **words);
+/// The verbs in the order of the help: name, function, why it has no --json (NULL: it has), and the words that may
+/// follow it (a function of help.c, or NULL).
+#define CTL_VERBS(VERB)                                                                                                \
+    VERB(status, verb_status, NULL, NULL)                                                                              \
+    VERB(top, verb_top, "top draws a screen; for JSON lines: iwheelctl watch state", NULL)                             \
+    VERB(web, verb_web, "web prints an address; it has no --json", NULL)                                               \
+    VERB(fleet, verb_fleet, NULL, fleet_choice)                                                                        \
+    VERB(watch, verb_watch, NULL, topic_choice)                                                                        \
+    VERB(drive, verb_drive, NULL, NULL)                                                                                \
+    VERB(stop, verb_stop, NULL, NULL)                                                                                  \
+    VERB(disarm, verb_disarm, NULL, NULL)                                                                              \
+    VERB(estop, verb_estop, NULL, NULL)                                                                                \
+    VERB(reset, verb_reset, NULL, NULL)                                                                                \
+    VERB(release, verb_release, NULL, NULL)                                                                            \
+    VERB(tare, verb_tare, NULL, side_choice)                                                                           \
+    VERB(ledger, verb_ledger, NULL, NULL)                                                                              \
+    VERB(confirm, verb_confirm, NULL, item_choice)                                                                     \
+    VERB(config, verb_config, NULL, config_choice)                                                                     \
+    VERB(doctor, verb_doctor, NULL, NULL)                                                                              \
+    VERB(bringup, verb_bringup, "bringup is interactive; it has no --json (doctor has)", NULL)                         \
+    VERB(why, verb_why, NULL, NULL)                                                                                    \
+    VERB(record, verb_record, NULL, NULL)                                                                              \
+    VERB(decode, verb_decode, NULL, NULL)                                                                              \
+    VERB(learn, verb_learn, NULL, NULL)                                                                                \
+    VERB(replay, verb_replay, NULL, NULL)                                                                              \
+    VERB(export, verb_export, "export writes a file; for JSON lines: iwheelctl --json decode FILE", NULL)              \
+    VERB(help, verb_help, "help is text for people; it has no --json", verb_choice)
+
+#define CTL_DECLARE(name, run, no_json, choice) int run(ctl_t *self, int count, char **words);
+CTL_VERBS(CTL_DECLARE)
 
 /// Prints "iwheelctl: ..." on stderr and returns `code`.
 __attribute__((format(printf, 2, 3))) int ctl_fail(int code, const char *format, ...);
@@ -73,9 +80,13 @@ typedef struct {
     const char *reason; ///< Reason of an e-stop; NULL: none. A reason that is not valid in a request is left out.
 } ctl_stop_t;
 
-/// Sends a stop as `ctl_ask` does, through a connection of its own: through the gateway's other socket if the first one
-/// has no place or does not answer.
-int ctl_stop(ctl_t *self, const ctl_stop_t *stop, json_t **out_reply);
+/// Receives the reply of a gateway that executed a stop; `path` is its socket, NULL if no other gateway was asked.
+typedef void (*ctl_stopped_t)(const ctl_t *self, const char *path, const json_t *reply);
+
+/// Sends a stop through a connection of its own: through the gateway's other socket if the first one has no place or
+/// does not answer. Without --socket it sends the stop to every gateway. Reports errors as `ctl_ask` does. Returns 0 if
+/// at least one gateway executed it.
+int ctl_stop(ctl_t *self, const ctl_stop_t *stop, ctl_stopped_t stopped);
 
 /// First half of `ctl_ask`: returns 0 with any reply in `*out_reply`. Prints only errors of the connection.
 int ctl_exchange(ctl_t *self, json_t *request, json_t **out_reply);
@@ -112,7 +123,10 @@ typedef struct {
 } near_gateway_t;
 
 /// Finds the gateway of `bus`, or, with a null pointer, the only one.
-void near_look(ctl_t *ctl, const char *bus, near_gateway_t *out_gateway);
+void near_find(ctl_t *ctl, const char *bus, near_gateway_t *out_gateway);
+
+/// Sends a stop as `ctl_stop` does, without printing. It closes the connection of the client.
+iwc_result_t near_stop(ctl_t *ctl, const ctl_stop_t *stop);
 
 /// Asks the connected gateway without printing. Returns a new reference, or NULL.
 json_t *near_ask(ctl_t *ctl, json_t *request);

@@ -11,6 +11,13 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+/// Longest time for each of several gateways in the first pass. A working gateway replies within milliseconds.
+#define SOON_MS  60
+#define REPLY_MS (CLIENT_REPLY_US / 1000)
+/// Most gateways of a machine, and the size of the list of their sockets.
+#define GATEWAYS_MAX 64U
+#define FOUND_SIZE   (GATEWAYS_MAX * 108U)
+
 #define START_HINT "is the gateway running? Start it (systemctl start iwheel-gateway), or use --socket PATH"
 
 int ctl_fail(int code, const char *format, ...) {
@@ -126,16 +133,15 @@ int ctl_lost(iwc_result_t result) {
     }
 }
 
-/// Finds the socket and writes it to `out_path`, unless --socket names it. Returns an exit code.
-static int find_one(ctl_t *self, char *out_path, size_t size) {
-    switch (choose(self, NULL, out_path, size)) {
+/// Reports why there is not one socket to try; `path` is what `choose` wrote. Returns an exit code.
+static int report_unfound(near_t result, const char *path) {
+    switch (result) {
     case NEAR_FOUND:
         return CTL_OK;
     case NEAR_SEVERAL:
-        return ctl_fail(CTL_USAGE, "several gateways are running; choose one with --socket: %s", out_path);
+        return ctl_fail(CTL_USAGE, "several gateways are running; choose one with --socket: %s", path);
     case NEAR_DENIED:
-        return ctl_fail(CTL_PERMISSION, "you may not read %s; sudo usermod -aG iwheel $USER, then log in again",
-                        out_path);
+        return ctl_fail(CTL_PERMISSION, "you may not read %s; sudo usermod -aG iwheel $USER, then log in again", path);
     default:
         return ctl_fail(CTL_UNAVAILABLE, "no gateway's socket under %s; %s", IWC_DIRECTORY, START_HINT);
     }
@@ -144,7 +150,7 @@ static int find_one(ctl_t *self, char *out_path, size_t size) {
 /// Finds the socket and connects. Returns an exit code.
 static int connect_to_one(ctl_t *self) {
     char found[512];
-    const int code = find_one(self, found, sizeof found);
+    const int code = report_unfound(choose(self, NULL, found, sizeof found), found);
     if (code != CTL_OK) {
         return code;
     }
@@ -170,8 +176,7 @@ int ctl_exchange(ctl_t *self, json_t *request, json_t **out_reply) {
     return (result == IWC_OK) ? CTL_OK : ctl_lost(result);
 }
 
-static iwc_result_t stop_at(ctl_t *self, const char *path, const ctl_stop_t *stop) {
-    const int timeout_ms = (int)(CLIENT_REPLY_US / 1000);
+static iwc_result_t stop_at(ctl_t *self, const char *path, const ctl_stop_t *stop, int timeout_ms) {
     iwc_t *gateway = self->client.gateway;
     iwc_result_t result = IWC_INTERRUPTED;
     iwc_let_in(gateway, signals_let_in());
@@ -182,29 +187,81 @@ static iwc_result_t stop_at(ctl_t *self, const char *path, const ctl_stop_t *sto
     return result;
 }
 
-/// Stops in any case: a reason that is not valid text does not prevent a stop.
-static iwc_result_t stop_anyhow(ctl_t *self, const char *path, const ctl_stop_t *stop) {
-    const iwc_result_t result = stop_at(self, path, stop);
-    const bool spoilt = result == IWC_INVALID || result == IWC_REFUSED;
-    return (stop->reason != NULL && spoilt) ? stop_at(self, path, &(ctl_stop_t){.latches = true}) : result;
+/// Reports a failed stop, or reads its reply. Returns as ctl_ask does.
+static int report_stop(ctl_t *self, const char *path, iwc_result_t result, json_t **out_reply) {
+    iwc_message_t message;
+    if ((result != IWC_OK && result != IWC_REFUSED) || !iwc_reply(self->client.gateway, &message)) {
+        return report_unopened(self, path, result);
+    }
+    self->client.line = message.text;
+    *out_reply = json_loadb(message.text, message.length, JSON_REJECT_DUPLICATES, NULL);
+    return (*out_reply != NULL) ? ctl_accept(self, out_reply) : ctl_lost(IWC_GARBLED);
 }
 
-int ctl_stop(ctl_t *self, const ctl_stop_t *stop, json_t **out_reply) {
-    char found[512];
-    iwc_message_t reply;
-    *out_reply = NULL;
-    const int code = find_one(self, found, sizeof found);
+/// Splits a list of paths under IWC_DIRECTORY. Returns their number.
+static unsigned split(char *list, char *out_paths[GATEWAYS_MAX]) {
+    unsigned count = 0;
+    while (list != NULL && count < GATEWAYS_MAX) {
+        out_paths[count] = list;
+        count++;
+        list = strstr(list, " " IWC_DIRECTORY "/");
+        if (list != NULL) {
+            *list = '\0';
+            list++;
+        }
+    }
+    return count;
+}
+
+/// Stops each gateway of the list. One that does not reply soon comes last, so that it delays no other. Returns CTL_OK
+/// if one of them stopped.
+static int stop_each(ctl_t *self, char *list, const ctl_stop_t *stop, ctl_stopped_t stopped) {
+    char *paths[GATEWAYS_MAX];
+    const unsigned count = split(list, paths);
+    int failure = CTL_UNAVAILABLE;
+    bool done = false;
+    for (unsigned pass = 0; pass < 2U; pass++) {
+        for (unsigned i = 0; i < count; i++) {
+            json_t *reply = NULL;
+            if (paths[i] == NULL) {
+                continue;
+            }
+            const iwc_result_t result = stop_at(self, paths[i], stop, (pass == 0U) ? SOON_MS : REPLY_MS);
+            if (pass == 0U && result != IWC_OK) {
+                continue;
+            }
+            const int code = report_stop(self, paths[i], result, &reply);
+            if (code == CTL_OK) {
+                stopped(self, paths[i], reply);
+                done = true;
+            } else {
+                failure = ctl_fail(code, "%s: the stop failed", paths[i]);
+            }
+            json_decref(reply);
+            paths[i] = NULL;
+        }
+    }
+    return done ? CTL_OK : failure;
+}
+
+int ctl_stop(ctl_t *self, const ctl_stop_t *stop, ctl_stopped_t stopped) {
+    char found[FOUND_SIZE];
+    json_t *reply = NULL;
+    const near_t result = choose(self, NULL, found, sizeof found);
+    if (result == NEAR_SEVERAL) {
+        return stop_each(self, found, stop, stopped);
+    }
+    int code = report_unfound(result, found);
     if (code != CTL_OK) {
         return code;
     }
     const char *path = (self->socket != NULL) ? self->socket : found;
-    const iwc_result_t result = stop_anyhow(self, path, stop);
-    if ((result != IWC_OK && result != IWC_REFUSED) || !iwc_reply(self->client.gateway, &reply)) {
-        return report_unopened(self, path, result);
+    code = report_stop(self, path, stop_at(self, path, stop, REPLY_MS), &reply);
+    if (code == CTL_OK) {
+        stopped(self, NULL, reply);
     }
-    self->client.line = reply.text;
-    *out_reply = json_loadb(reply.text, reply.length, JSON_REJECT_DUPLICATES, NULL);
-    return (*out_reply != NULL) ? ctl_accept(self, out_reply) : ctl_lost(IWC_GARBLED);
+    json_decref(reply);
+    return code;
 }
 
 int ctl_ask(ctl_t *self, json_t *request, json_t **out_reply) {
@@ -225,7 +282,11 @@ int ctl_accept(const ctl_t *self, json_t **reply) {
     return refused;
 }
 
-static near_t look_at(ctl_t *ctl, const char *path) {
+iwc_result_t near_stop(ctl_t *ctl, const ctl_stop_t *stop) {
+    return stop_at(ctl, ctl->socket, stop, REPLY_MS);
+}
+
+static near_t ask_near(ctl_t *ctl, const char *path) {
     switch (client_open(&ctl->client, path, client_now_us() + CLIENT_REPLY_US)) {
     case IWC_OK:
         return NEAR_FOUND;
@@ -244,11 +305,11 @@ json_t *near_ask(ctl_t *ctl, json_t *request) {
     return (client_ask(&ctl->client, request, &reply) == IWC_OK) ? reply : NULL;
 }
 
-void near_look(ctl_t *ctl, const char *bus, near_gateway_t *out_gateway) {
+void near_find(ctl_t *ctl, const char *bus, near_gateway_t *out_gateway) {
     memset(out_gateway, 0, sizeof(*out_gateway));
     near_t result = choose(ctl, bus, out_gateway->path, sizeof out_gateway->path);
     if (result == NEAR_FOUND) {
-        result = look_at(ctl, out_gateway->path);
+        result = ask_near(ctl, out_gateway->path);
     }
     if (result == NEAR_FOUND) {
         out_gateway->status = near_ask(ctl, json_pack("{s:s}", "cmd", "status"));

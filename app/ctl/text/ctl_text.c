@@ -168,7 +168,7 @@ void paper_text(const paper_t *self, tone_t tone, unsigned width, const char *te
     }
 }
 
-void paper_say(const paper_t *self, tone_t tone, const char *format, ...) {
+void paper_print(const paper_t *self, tone_t tone, const char *format, ...) {
     char text[1024];
     va_list list;
     va_start(list, format);

@@ -88,7 +88,7 @@ typedef struct {
 void paper_text(const paper_t *self, tone_t tone, unsigned width, const char *text);
 
 /// Writes a formatted text, not padded.
-__attribute__((format(printf, 3, 4))) void paper_say(const paper_t *self, tone_t tone, const char *format, ...);
+__attribute__((format(printf, 3, 4))) void paper_print(const paper_t *self, tone_t tone, const char *format, ...);
 
 /// Begins a line: writes the label, padded.
 void paper_label(const paper_t *self, const char *label);

@@ -40,7 +40,8 @@ typedef struct {
 
 void top_history_take(top_history_t *self, int64_t now_us, const json_t *state) {
     static const char *const fields[] = {"speed_mm_s", "force_net_mN"};
-    const int64_t slot = now_us / TOP_HISTORY_US;
+    // In the first minute after the machine has booted, the slots before this one must not be negative.
+    const int64_t slot = now_us / TOP_HISTORY_US + TOP_HISTORY;
     if (slot - self->slot > TOP_HISTORY || self->slot == 0) {
         self->slot = slot - TOP_HISTORY;
     }

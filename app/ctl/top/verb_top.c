@@ -40,13 +40,14 @@ __attribute__((format(printf, 2, 3))) static void notice(top_t *self, const char
     self->notice_until_us = client_now_us() + NOTICE_US;
 }
 
-static void send_request(top_t *self, json_t *request, const char *what) {
+/// Returns false if the request was not sent.
+static bool send_request(top_t *self, json_t *request, const char *what) {
     if (!self->model.connected) {
         json_decref(request);
-        return;
+        return false;
     }
     self->pending = what;
-    (void)client_send(&self->ctl->client, request, client_now_us() + DRAW_US, &self->pending_id);
+    return client_send(&self->ctl->client, request, client_now_us() + DRAW_US, &self->pending_id) == IWC_OK;
 }
 
 static void disconnect(top_t *self, const char *why) {
@@ -57,6 +58,22 @@ static void disconnect(top_t *self, const char *why) {
     json_decref(self->model.state);
     self->model.state = NULL;
     notice(self, "%s", why);
+}
+
+/// Sends a stop, through a connection of its own if there is none that accepts it.
+static void send_stop(top_t *self, json_t *request, const ctl_stop_t *stop, const char *what) {
+    if (send_request(self, request, what)) {
+        return;
+    }
+    const iwc_result_t result = near_stop(self->ctl, stop);
+    self->pending = NULL;
+    disconnect(self, "");
+    self->retry_us = client_now_us() + NOTICE_US / 2; // The operator can read this notice before the next one.
+    if (result == IWC_OK) {
+        notice(self, "%s: done", what);
+    } else {
+        notice(self, "%s failed: %s", what, iwc_reason(self->ctl->client.gateway));
+    }
 }
 
 static void store_sentence(top_t *self, const json_t *stop) {
@@ -81,7 +98,7 @@ static void try_connect(top_t *self) {
         [NEAR_MUTE] = "the gateway accepts the connection and does not answer; see its log",
     };
     near_gateway_t gateway;
-    near_look(self->ctl, NULL, &gateway);
+    near_find(self->ctl, NULL, &gateway);
     if (gateway.result != NEAR_FOUND) {
         disconnect(self, reasons[gateway.result]);
         return;
@@ -96,8 +113,8 @@ static void try_connect(top_t *self) {
     json_t *why = near_ask(self->ctl, json_pack("{s:s}", "cmd", "why"));
     store_sentence(self, why);
     json_decref(why);
-    send_request(self, json_pack("{s:s,s:[s,s],s:i}", "cmd", "watch", "topics", "state", "stop", "rate_hz", RATE_HZ),
-                 NULL);
+    (void)send_request(
+        self, json_pack("{s:s,s:[s,s],s:i}", "cmd", "watch", "topics", "state", "stop", "rate_hz", RATE_HZ), NULL);
 }
 
 static void take_reply(top_t *self, const json_t *line) {
@@ -140,24 +157,26 @@ static void read_gateway(top_t *self) {
         } else if (result == IWC_TIMEOUT || result == IWC_INTERRUPTED) {
             return;
         } else {
-            disconnect(self, "the gateway ended the connection; waiting for its return");
+            disconnect(self, "the gateway ended the connection; waiting for a gateway");
         }
     }
 }
 
 /// Handles a key. Returns false to quit.
 static bool take_key(top_t *self, int key) {
+    static const char reason[] = "a key in iwheelctl top";
     switch (key) {
     case ' ':
-        send_request(self, json_pack("{s:s}", "cmd", "stop"), "stop");
+        send_stop(self, json_pack("{s:s}", "cmd", "stop"), &(ctl_stop_t){.latches = false}, "stop");
         return true;
     case 'e':
     case 'E':
-        send_request(self, json_pack("{s:s,s:s}", "cmd", "estop", "reason", "a key in iwheelctl top"), "e-stop");
+        send_stop(self, json_pack("{s:s,s:s}", "cmd", "estop", "reason", reason),
+                  &(ctl_stop_t){.latches = true, .reason = reason}, "e-stop");
         return true;
     case 'r':
     case 'R':
-        send_request(self, json_pack("{s:s}", "cmd", "reset"), "reset");
+        (void)send_request(self, json_pack("{s:s}", "cmd", "reset"), "reset");
         return true;
     case 'q':
     case 'Q':

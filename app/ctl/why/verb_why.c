@@ -166,7 +166,7 @@ static const char *find_directory(ctl_t *self, const words_t *words, json_t **ou
         return words->directory;
     }
     near_gateway_t gateway = {0};
-    near_look(self, NULL, &gateway);
+    near_find(self, NULL, &gateway);
     json_decref(gateway.status);
     *out_owner = (gateway.result == NEAR_FOUND) ? near_ask(self, json_pack("{s:s}", "cmd", "why")) : NULL;
     const char *directory = json_string_value(json_object_get(*out_owner, "directory"));

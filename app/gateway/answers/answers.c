@@ -89,7 +89,7 @@ bool iwn_target_is_key(iwn_server_t *server, const iwn_client_t *client, const c
 
 bool iwn_target_is_fresh(iwn_server_t *server, iwn_client_t *client, iw_time_us_t *out_sent_us) {
     const gw_answers_t *self = gw_answers_of(server);
-    const iw_time_us_t armed_us = gw_wheels_look(self->wheels).armed_us;
+    const iw_time_us_t armed_us = gw_wheels_snapshot(self->wheels).armed_us;
     *out_sent_us = sock_client_sent_us(gw_answers_connection(self, client), server->now_us,
                                        armed_us); // The request may have waited.
     return true;
@@ -233,8 +233,15 @@ static void carry_out(void *context, sock_client_t *connection, const char *line
         gw_wheels_time_request(self->wheels);
         server->now_us = self->wheels->now_us;
         iwn_server_request(server, client);
-        gw_answers_look_further(self, iwn_server_look(server));
+        gw_answers_check_watchers(self, iwn_server_snapshot(server));
     }
+}
+
+static bool stops(void *context, const char *line, size_t length) {
+    gw_answers_t *self = (gw_answers_t *)context;
+    iwn_server_t *server = &self->server;
+    return iwn_request_read(line, length, &self->work, &server->request, &server->refusal) &&
+           iwn_cmd_stops(server->request.cmd);
 }
 
 /// Reports the effects of the end while the client still has its name.
@@ -248,7 +255,7 @@ static void leave(void *context, sock_client_t *connection) {
     if (connection->phase != SOCK_OPEN) {
         served->client.topics = 0; // It receives no more events.
     }
-    const iw_snapshot_t seen = gw_wheels_look(self->wheels);
+    const iw_snapshot_t seen = gw_wheels_snapshot(self->wheels);
     gw_answers_observe(self, &seen);
 }
 
@@ -265,7 +272,8 @@ static void welcome(void *context, sock_client_t *connection) {
 }
 
 sock_handler_t gw_answers_handler(gw_answers_t *self) {
-    return (sock_handler_t){.welcome = welcome, .carry_out = carry_out, .leave = leave, .context = self};
+    return (sock_handler_t){
+        .welcome = welcome, .carry_out = carry_out, .stops = stops, .leave = leave, .context = self};
 }
 
 void gw_answers_arming(gw_answers_t *self, const iw_snapshot_t *seen) {

@@ -119,7 +119,7 @@ static inline gw_served_t *gw_answers_served(gw_answers_t *self, const sock_clie
 void gw_answers_refresh(gw_answers_t *self);
 
 /// Checks the daemon's own causes of events: faults of health, the queue of the bus, changes of assumptions.
-void gw_answers_look_further(gw_answers_t *self, const iw_snapshot_t *seen);
+void gw_answers_check_watchers(gw_answers_t *self, const iw_snapshot_t *seen);
 
 /// Writes "joystick" (client 3, pid 4711); a client that is gone has no name.
 void gw_answers_describe(gw_answers_t *self, iw_client_t id, char out_text[GW_CLIENT_TEXT_SIZE]);

@@ -53,7 +53,7 @@ static void log_stop(const gw_answers_t *self) {
 static void log_lease(gw_answers_t *self, const char *change) {
     const iw_client_t holder = self->server.reported.holder;
     sock_log(self->log, SOCK_LOG_INFO, "lease %s: %s", change,
-             (holder == IW_CLIENT_NONE) ? "nobody" : iwn_target_name(&self->server, holder));
+             (holder == IW_CLIENT_NONE) ? "no holder" : iwn_target_name(&self->server, holder));
 }
 
 static void log_fault(const gw_answers_t *self, const char *cause, bool present) {
@@ -136,7 +136,7 @@ static void observe_health(gw_answers_t *self, const iw_snapshot_t *seen) {
         return;
     }
     const gw_health_t before = *health;
-    gw_health_look(health, seen);
+    gw_health_check(health, seen);
     report_ailment(self, seen, &before, GW_BATTERY_LOW, "battery_low");
     report_ailment(self, seen, &before, GW_TEMPERATURE_HIGH, "temperature_high");
 }
@@ -163,7 +163,7 @@ static void observe_purge(gw_answers_t *self) {
     }
 }
 
-void gw_answers_look_further(gw_answers_t *self, const iw_snapshot_t *seen) {
+void gw_answers_check_watchers(gw_answers_t *self, const iw_snapshot_t *seen) {
     observe_purge(self);
     observe_health(self, seen);
     gw_assumptions_observe(self->assumptions, seen);
@@ -174,7 +174,7 @@ void gw_answers_look_further(gw_answers_t *self, const iw_snapshot_t *seen) {
 void gw_answers_observe(gw_answers_t *self, const iw_snapshot_t *seen) {
     gw_answers_refresh(self);
     iwn_server_observe(&self->server, seen);
-    gw_answers_look_further(self, seen);
+    gw_answers_check_watchers(self, seen);
 }
 
 static void report_frame(iwn_server_t *server, const gw_tapped_t *tapped) {

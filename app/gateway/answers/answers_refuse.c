@@ -85,7 +85,7 @@ void iwn_target_contradiction(iwn_server_t *server, iw_assumption_item_t item, c
     gw_assumptions_describe_contradiction(gw_answers_of(server)->assumptions, item, out_text, size);
 }
 
-void iwn_target_say_right(iwn_server_t *server) {
+void iwn_target_refuse_right(iwn_server_t *server) {
     const gw_answers_t *self = gw_answers_of(server);
     char *message = server->refusal.message;
     const size_t size = sizeof server->refusal.message;

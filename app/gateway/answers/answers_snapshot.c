@@ -74,7 +74,7 @@ void iwn_target_write_assumptions(iwn_server_t *server, const iw_snapshot_t *see
 
 void iwn_target_status(iwn_server_t *server, iwn_client_t *client) {
     iwn_out_t json = iwn_server_begin_reply(server, &server->request.id);
-    iwn_server_write_status(server, iwn_server_look(server), &json);
+    iwn_server_write_status(server, iwn_server_snapshot(server), &json);
     iwn_server_send_reply(server, client, &json);
 }
 

@@ -92,7 +92,7 @@ static void give_up(gw_answers_t *self) {
 
 bool gw_recordings_take(gw_answers_t *self) {
     const gw_child_news_t news = gw_box_receive(self->box);
-    if (news == GW_CHILD_SAID) {
+    if (news == GW_CHILD_MESSAGE) {
         pass_on(self, &self->box->answer);
     } else if (news == GW_CHILD_ENDED) {
         give_up(self);

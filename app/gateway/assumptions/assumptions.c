@@ -87,7 +87,7 @@ static void observe_button(gw_assumptions_t *self) {
     if (!kind->present || kind->simulated) {
         return;
     }
-    const gw_button_news_t news = gw_button_look(&self->button, &wheels->hal, wheels->now_us, &self->known.tried);
+    const gw_button_news_t news = gw_button_poll(&self->button, &wheels->hal, wheels->now_us, &self->known.tried);
     if (news != GW_BUTTON_NO_NEWS) {
         self->changed = true;
         gw_assumptions_report_button(self, news);
@@ -117,7 +117,7 @@ void gw_assumptions_observe(gw_assumptions_t *self, const iw_snapshot_t *seen) {
 
 /// Adds an entry of an earlier run, unless this run has a newer one.
 static void merge_item(gw_assumptions_t *self, iw_assumption_item_t item, const gw_stored_item_t *stored) {
-    const iw_assumption_entry_t *present = &gw_wheels_look(self->wheels).assumed[item];
+    const iw_assumption_entry_t *present = &gw_wheels_snapshot(self->wheels).assumed[item];
     char value[IWN_VALUE_SIZE];
     inspect_assumption_value(&self->configured, item, value);
     if (stored->entry.state == IW_ASSUMED || present->state == IW_CONTRADICTED) {
@@ -273,7 +273,7 @@ bool gw_assumptions_confirm(gw_assumptions_t *self, iw_assumption_item_t item, c
         known->since_wall_us = iwl_clock_wall_us();
     }
     self->changed = true;
-    const iw_snapshot_t seen = gw_wheels_look(self->wheels);
+    const iw_snapshot_t seen = gw_wheels_snapshot(self->wheels);
     gw_assumptions_observe(self, &seen);
     return true;
 }
@@ -281,14 +281,15 @@ bool gw_assumptions_confirm(gw_assumptions_t *self, iw_assumption_item_t item, c
 void gw_assumptions_describe_contradiction(const gw_assumptions_t *self, iw_assumption_item_t item, char *out_text,
                                            size_t size) {
     char source[INSPECT_SOURCE_SIZE];
-    inspect_assumption_source(item, &gw_wheels_look(self->wheels).assumed[item], &self->known.item[item].word, source);
+    inspect_assumption_source(item, &gw_wheels_snapshot(self->wheels).assumed[item], &self->known.item[item].word,
+                              source);
     (void)snprintf(out_text, size, "%s is contradicted: %s; %s", iwn_assumption_item_name(item), source,
                    inspect_assumption_cost(item));
 }
 
 void gw_assumptions_close(gw_assumptions_t *self) {
     if (self->answered && self->changed) {
-        self->store.waits = false; // Its outstanding news no longer matter.
+        self->store.waits = false; // The result of an outstanding write no longer matters.
         hand_over(self);
     }
     gw_file_store_close(&self->store);

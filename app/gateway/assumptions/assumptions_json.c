@@ -34,7 +34,7 @@ static void write_item(const source_t *source, iw_assumption_item_t item, iwn_ou
 }
 
 void gw_assumptions_write_item(const gw_assumptions_t *self, iw_assumption_item_t item, iwn_out_t *json) {
-    const source_t source = {&self->configured, gw_wheels_look(self->wheels).assumed, self->known.item};
+    const source_t source = {&self->configured, gw_wheels_snapshot(self->wheels).assumed, self->known.item};
     write_item(&source, item, json);
 }
 

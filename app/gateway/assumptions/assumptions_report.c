@@ -19,7 +19,7 @@ static const char *side_name(iw_side_t side) {
 }
 
 void gw_assumptions_report_item(gw_assumptions_t *self, iw_assumption_item_t item) {
-    const iw_assumption_entry_t *entry = &gw_wheels_look(self->wheels).assumed[item];
+    const iw_assumption_entry_t *entry = &gw_wheels_snapshot(self->wheels).assumed[item];
     const bool bad = entry->state == IW_CONTRADICTED;
     char value[IWN_VALUE_SIZE];
     char source[INSPECT_SOURCE_SIZE];
@@ -108,7 +108,7 @@ static void list_items(const iw_assumption_entry_t *assumed, iw_assumption_state
 }
 
 void gw_assumptions_report_changes(gw_assumptions_t *self) {
-    const iw_assumption_entry_t *assumed = gw_wheels_look(self->wheels).assumed;
+    const iw_assumption_entry_t *assumed = gw_wheels_snapshot(self->wheels).assumed;
     char items[512];
     list_items(assumed, IW_CONFIRMED, items, sizeof items);
     if (items[0] != '\0') {

@@ -84,7 +84,7 @@ static bool is_news(gw_button_t *self, const iwl_hal_t *hal) {
     return news;
 }
 
-gw_button_news_t gw_button_look(gw_button_t *self, const iwl_hal_t *hal, iw_time_us_t now_us, gw_tried_t *tried) {
+gw_button_news_t gw_button_poll(gw_button_t *self, const iwl_hal_t *hal, iw_time_us_t now_us, gw_tried_t *tried) {
     iwl_estop_seen_t seen[IWL_ESTOP_CONTACTS];
     if (!is_news(self, hal)) {
         return GW_BUTTON_NO_NEWS;

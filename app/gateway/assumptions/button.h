@@ -56,7 +56,7 @@ typedef enum {
 
 /// Evaluates the last reading of the e-stop. A simulated or absent button has no result. A reading that is equal to the
 /// one before has no result either, because the identity of a line changes only after it was unreadable.
-gw_button_news_t gw_button_look(gw_button_t *self, const iwl_hal_t *hal, iw_time_us_t now_us, gw_tried_t *tried);
+gw_button_news_t gw_button_poll(gw_button_t *self, const iwl_hal_t *hal, iw_time_us_t now_us, gw_tried_t *tried);
 
 /// Writes the members into an open object.
 void gw_tried_write(const gw_tried_t *tried, iwn_out_t *json);

@@ -48,7 +48,7 @@ int gw_box_open(gw_box_t *self, const gw_box_config_t *config) {
 
 void gw_box_close(gw_box_t *self) {
     const gw_box_order_t bye = {.kind = GW_BOX_LAST};
-    (void)gw_child_say(&self->writer, &bye, sizeof bye);
+    (void)gw_child_send(&self->writer, &bye, sizeof bye);
     gw_child_close(&self->writer);
     gw_child_close(&self->reader);
     if (self->ring != NULL) {
@@ -58,7 +58,7 @@ void gw_box_close(gw_box_t *self) {
 }
 
 bool gw_box_write(gw_box_t *self, const gw_box_order_t *order) {
-    return gw_child_revive(&self->writer) && gw_child_say(&self->writer, order, sizeof *order);
+    return gw_child_revive(&self->writer) && gw_child_send(&self->writer, order, sizeof *order);
 }
 
 static gw_child_news_t not_understood(gw_child_t *child) {
@@ -86,15 +86,15 @@ gw_child_news_t gw_box_take(gw_box_t *self) {
     gw_box_result_t result;
     size_t length;
     const gw_child_news_t news = gw_child_receive(&self->writer, &result, sizeof result, &length);
-    if (news == GW_CHILD_SAID && length != sizeof result) {
+    if (news == GW_CHILD_MESSAGE && length != sizeof result) {
         return not_understood(&self->writer);
     }
-    if (news == GW_CHILD_SAID) {
+    if (news == GW_CHILD_MESSAGE) {
         self->news = result.kind;
     }
-    if (news == GW_CHILD_SAID && result.kind != GW_BOX_STOP) {
+    if (news == GW_CHILD_MESSAGE && result.kind != GW_BOX_STOP) {
         take_request(&self->request, &result);
-    } else if (news == GW_CHILD_SAID) {
+    } else if (news == GW_CHILD_MESSAGE) {
         self->last = result;
         if (result.number != 0U) {
             self->stop = result;
@@ -108,14 +108,14 @@ gw_child_news_t gw_box_take(gw_box_t *self) {
 }
 
 bool gw_box_ask(gw_box_t *self, const gw_box_question_t *question) {
-    return gw_child_revive(&self->reader) && gw_child_say(&self->reader, question, sizeof *question);
+    return gw_child_revive(&self->reader) && gw_child_send(&self->reader, question, sizeof *question);
 }
 
 gw_child_news_t gw_box_receive(gw_box_t *self) {
     const size_t head = offsetof(gw_box_answer_t, text);
     size_t length;
     const gw_child_news_t news = gw_child_receive(&self->reader, &self->answer, sizeof self->answer, &length);
-    if (news != GW_CHILD_SAID) {
+    if (news != GW_CHILD_MESSAGE) {
         return news;
     }
     if (length < head || length - head != self->answer.length || self->answer.length >= sizeof self->answer.text) {
@@ -172,7 +172,7 @@ static const char *const ends[GW_BOX_ENDS] = {
     [GW_BOX_BY_REQUEST] = "request", [GW_BOX_BY_TIME] = "time", [GW_BOX_BY_SIZE] = "size", [GW_BOX_BY_FAULT] = "fault"};
 
 static bool order_request(gw_box_t *box, const gw_box_order_t *order) {
-    return (order->kind == GW_BOX_BEGIN) ? gw_box_write(box, order) : gw_child_say(&box->writer, order, sizeof *order);
+    return (order->kind == GW_BOX_BEGIN) ? gw_box_write(box, order) : gw_child_send(&box->writer, order, sizeof *order);
 }
 
 const char *gw_record_request(gw_box_t *box, bool on, const char *who, iw_time_us_t now_us) {
@@ -249,7 +249,7 @@ static void report_result(const gw_box_t *box, sock_log_t *log) {
 
 void gw_record_take(gw_box_t *box, sock_log_t *log) {
     switch (gw_box_take(box)) {
-    case GW_CHILD_SAID:
+    case GW_CHILD_MESSAGE:
         if (box->news == GW_BOX_STOP) {
             report_result(box, log);
         } else {

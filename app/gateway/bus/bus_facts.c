@@ -38,7 +38,7 @@ __attribute__((format(printf, 2, 3))) static void warn(gw_wheels_t *wheels, cons
 }
 
 static void warn_of_health(gw_wheels_t *wheels) {
-    const iw_snapshot_t seen = gw_wheels_look(wheels);
+    const iw_snapshot_t seen = gw_wheels_snapshot(wheels);
     char sentence[GW_WARNING_SIZE];
     for (unsigned i = 0; i < (unsigned)IW_SIDES * GW_AILMENTS; i++) {
         const iw_side_t side = (iw_side_t)(i / GW_AILMENTS);

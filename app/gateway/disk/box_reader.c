@@ -17,7 +17,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#define IS_ENDING "a name is one from the reply to recordings, followed by .log, .jsonl or .conf"
+#define IS_ENDING "use a name from the reply to recordings, followed by .log, .jsonl or .conf"
 
 /// A recording of the list.
 typedef struct {
@@ -233,7 +233,7 @@ static int open_file(int directory, const char *name, int64_t *out_size) {
 static void answer_piece(int directory, const gw_box_question_t *question, gw_box_answer_t *out) {
     int64_t size = 0;
     if (gw_box_files_stem(question->name) == 0U) {
-        refuse(out, IWN_BAD_VALUE, "name is not that of a recording's file: " IS_ENDING);
+        refuse(out, IWN_BAD_VALUE, "name does not name a file of a recording; " IS_ENDING);
         return;
     }
     if (question->offset < 0) {

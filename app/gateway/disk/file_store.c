@@ -13,8 +13,8 @@
 #include <unistd.h>
 
 /// First byte of a message to the store process. In a message from it, the first byte is the news.
-#define SAY_WRITE 'w'
-#define SAY_ASIDE 'a'
+#define ORDER_WRITE 'w'
+#define ORDER_ASIDE 'a'
 
 /// State of the store process.
 typedef struct {
@@ -111,7 +111,7 @@ static int in_directory(const work_t *work, size_t length) {
     }
     int error = 0;
     (void)flock(directory, LOCK_EX);
-    if (work->message[0] == SAY_ASIDE) {
+    if (work->message[0] == ORDER_ASIDE) {
         (void)renameat(directory, work->name, directory, work->damaged);
     } else {
         error = write_over(work, directory, length);
@@ -131,7 +131,7 @@ static void serve(int fd, const void *context) {
     do {
         length = recv(fd, work.message, sizeof work.message, 0);
         if (length > 0) {
-            const bool writes = work.message[0] == SAY_WRITE;
+            const bool writes = work.message[0] == ORDER_WRITE;
             const int error = in_directory(&work, (size_t)length - 1U);
             if (writes) {
                 answer(&work, (error == 0) ? GW_FILE_STORE_WRITTEN : GW_FILE_STORE_FAILED, error);
@@ -143,32 +143,32 @@ static void serve(int fd, const void *context) {
 int gw_file_store_open(gw_file_store_t *self, const char *directory, const char *name) {
     *self = (gw_file_store_t){.directory = directory};
     (void)snprintf(self->name, sizeof self->name, "%s", name);
-    const int error = gw_child_start(&self->child, &(gw_child_work_t){"iwheel-keeper", 0, serve, self});
+    const int error = gw_child_start(&self->child, &(gw_child_work_t){"iwheel-store", 0, serve, self});
     self->waits = error == 0;
     return error;
 }
 
-static bool say(gw_file_store_t *self, char what, const char *text, size_t length) {
+static bool send_order(gw_file_store_t *self, char what, const char *text, size_t length) {
     if (length > GW_FILE_STORE_TEXT_MAX) {
         errno = EAGAIN;
         return false;
     }
     self->message[0] = what;
     memcpy(&self->message[1], text, length);
-    return gw_child_say(&self->child, self->message, length + 1U);
+    return gw_child_send(&self->child, self->message, length + 1U);
 }
 
 bool gw_file_store_write(gw_file_store_t *self, const char *text, size_t length) {
     if (self->waits || self->child.fd < 0) {
         return false;
     }
-    const bool accepted = say(self, SAY_WRITE, text, length);
+    const bool accepted = send_order(self, ORDER_WRITE, text, length);
     self->waits = accepted || errno != EAGAIN; // If the process has ended, the next news report it.
     return accepted;
 }
 
 void gw_file_store_set_aside(gw_file_store_t *self) {
-    (void)say(self, SAY_ASIDE, "", 0U);
+    (void)send_order(self, ORDER_ASIDE, "", 0U);
 }
 
 gw_file_store_news_t gw_file_store_receive(gw_file_store_t *self, const char **out_text, size_t *out_length,

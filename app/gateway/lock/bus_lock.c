@@ -156,10 +156,10 @@ int gw_bus_lock_take(gw_bus_lock_t *self, const char *bus, const char *directory
 }
 
 bool gw_bus_lock_poll(gw_bus_lock_t *self, iw_time_us_t now_us) {
-    if (now_us < self->look_us) {
+    if (now_us < self->poll_us) {
         return false;
     }
-    self->look_us = now_us + GW_BUS_LOCK_LOOK_US;
+    self->poll_us = now_us + GW_BUS_LOCK_POLL_US;
     return gw_bus_names_poll(&self->names, &self->holder);
 }
 

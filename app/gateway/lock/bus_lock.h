@@ -18,7 +18,7 @@
 
 #define GW_BUS_LOCK_PATH_SIZE (SOCK_ADDRESS_SIZE + 48U)
 /// Interval of checks for another gateway.
-#define GW_BUS_LOCK_LOOK_US 1000000U
+#define GW_BUS_LOCK_POLL_US 1000000U
 
 typedef struct {
     gw_bus_names_t names;
@@ -27,7 +27,7 @@ typedef struct {
     char path[GW_BUS_LOCK_PATH_SIZE];
     int fd;    ///< Descriptor of the file; -1 if it must not be opened.
     int error; ///< Errno of the reason.
-    iw_time_us_t look_us;
+    iw_time_us_t poll_us;
 } gw_bus_lock_t;
 
 /// Acquires the lock of the bus with this configured name. Returns 0 or an errno; EWOULDBLOCK: another process has it.

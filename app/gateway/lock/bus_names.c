@@ -17,7 +17,7 @@
 #include <unistd.h>
 
 #define ASKERS_MAX 64
-#define NOBODY     ((uid_t)-1)
+#define NO_USER    ((uid_t)-1)
 #define AGAIN_NS   10000000L
 /// Foreign processes can make the kernel's list long.
 #define LIST_US 50000U
@@ -42,13 +42,13 @@ static socklen_t address_of(const char *name, struct sockaddr_un *out_address) {
 
 // List of the kernel -------------------------------------------------------------------------------------------------
 
-/// Returns the owner of a socket with that name from one message of the list; NOBODY if the message is about another
+/// Returns the owner of a socket with that name from one message of the list; NO_USER if the message is about another
 /// socket.
 static uid_t owner_in(const struct nlmsghdr *message, const char *name) {
     const char *at = (const char *)message + sizeof(struct nlmsghdr) + sizeof(struct unix_diag_msg);
     const char *end = (const char *)message + message->nlmsg_len;
     struct nlattr head;
-    uid_t uid = NOBODY;
+    uid_t uid = NO_USER;
     bool ours = false;
     while (at + HEAD <= end) {
         memcpy(&head, at, sizeof head);
@@ -64,7 +64,7 @@ static uid_t owner_in(const struct nlmsghdr *message, const char *name) {
         }
         at += (head.nla_len + HEAD - 1U) / HEAD * HEAD;
     }
-    return ours ? uid : NOBODY;
+    return ours ? uid : NO_USER;
 }
 
 /// Reads the list up to the name, or to its end.
@@ -77,8 +77,8 @@ static uid_t search_list(int fd, const char *name) {
         const ssize_t got = recv(fd, buffer, sizeof buffer, 0);
         struct nlmsghdr *message = (struct nlmsghdr *)buffer;
         for (ssize_t left = got; left > 0 && NLMSG_OK(message, (size_t)left); message = NLMSG_NEXT(message, left)) {
-            const uid_t uid = (message->nlmsg_type == SOCK_DIAG_BY_FAMILY) ? owner_in(message, name) : NOBODY;
-            if (uid != NOBODY || message->nlmsg_type == NLMSG_DONE || message->nlmsg_type == NLMSG_ERROR) {
+            const uid_t uid = (message->nlmsg_type == SOCK_DIAG_BY_FAMILY) ? owner_in(message, name) : NO_USER;
+            if (uid != NO_USER || message->nlmsg_type == NLMSG_DONE || message->nlmsg_type == NLMSG_ERROR) {
                 return uid;
             }
         }
@@ -86,7 +86,7 @@ static uid_t search_list(int fd, const char *name) {
             break;
         }
     }
-    return NOBODY;
+    return NO_USER;
 }
 
 /// Returns the owner of a socket that does not listen, or accepts no connection.
@@ -100,7 +100,7 @@ static uid_t owner_listed(const char *name) {
                  .nlmsg_flags = NLM_F_REQUEST | NLM_F_DUMP},
         .body = {.sdiag_family = AF_UNIX, .udiag_states = UINT32_MAX, .udiag_show = UDIAG_SHOW_NAME | UDIAG_SHOW_UID},
     };
-    uid_t uid = NOBODY;
+    uid_t uid = NO_USER;
     const int fd = socket(AF_NETLINK, SOCK_RAW | SOCK_CLOEXEC, NETLINK_SOCK_DIAG);
     if (fd >= 0 && send(fd, &request, sizeof request, 0) == (ssize_t)sizeof request) {
         uid = search_list(fd, name);
@@ -117,7 +117,7 @@ static uid_t owner_listed(const char *name) {
 /// false if there is none.
 static bool ask(const char *name, gw_holder_t *out_holder) {
     struct sockaddr_un address;
-    struct ucred peer = {.uid = NOBODY};
+    struct ucred peer = {.uid = NO_USER};
     socklen_t size = sizeof peer;
     const socklen_t length = address_of(name, &address);
     const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
@@ -125,17 +125,17 @@ static bool ask(const char *name, gw_holder_t *out_holder) {
         return false;
     }
     const bool answers = connect(fd, (const struct sockaddr *)&address, length) == 0;
-    const bool somebody =
+    const bool bound =
         answers || errno != ECONNREFUSED; // The socket listens but accepts no connection, or is not a stream.
     if (answers && getsockopt(fd, SOL_SOCKET, SO_PEERCRED, &peer, &size) != 0) {
-        peer = (struct ucred){.uid = NOBODY};
+        peer = (struct ucred){.uid = NO_USER};
     }
     (void)close(fd);
-    if (somebody) {
+    if (bound) {
         *out_holder = (gw_holder_t){.uid = answers ? peer.uid : owner_listed(name), .pid = answers ? peer.pid : 0};
         (void)snprintf(out_holder->name, sizeof out_holder->name, "%s", name);
     }
-    return somebody;
+    return bound;
 }
 
 static int bind_name(const char *name, int *out_fd) {
@@ -170,7 +170,7 @@ static int take_place(gw_bus_names_t *self, gw_holder_t *out_stranger) {
             holder = (gw_holder_t){.uid = owner_listed(name)};
             (void)snprintf(holder.name, sizeof holder.name, "%s", name);
         }
-        const bool stranger = holder.uid == NOBODY || !sock_owners_have(&self->owners, holder.uid);
+        const bool stranger = holder.uid == NO_USER || !sock_owners_have(&self->owners, holder.uid);
         if (stranger && (out_stranger->name[0] == '\0' || (out_stranger->pid == 0 && holder.pid > 0))) {
             *out_stranger = holder; // One is reported: the first one with the most information.
         }
@@ -178,26 +178,26 @@ static int take_place(gw_bus_names_t *self, gw_holder_t *out_stranger) {
     return 0;
 }
 
-typedef enum { SEEN_NOBODY = 0, SEEN_UNKNOWN, SEEN_LATER, SEEN_EARLIER } seen_t;
+typedef enum { SEEN_NONE = 0, SEEN_UNKNOWN, SEEN_LATER, SEEN_EARLIER } seen_t;
 
 /// Order of all gateways, so that two never wait for each other.
 static bool comes_first(const gw_bus_names_t *self, uid_t uid, unsigned place) {
     return place < self->place || (place == self->place && uid < self->owners.own);
 }
 
-static seen_t look_at(const gw_bus_names_t *self, uid_t uid, unsigned place, gw_holder_t *out_holder) {
+static seen_t check_place(const gw_bus_names_t *self, uid_t uid, unsigned place, gw_holder_t *out_holder) {
     char name[GW_BUS_NAME_SIZE];
     gw_holder_t holder;
     const bool ours = place == self->place && self->fd >= 0 && (place == 0U || uid == self->owners.own);
     name_of(self, uid, place, name);
     if (ours || !ask(name, &holder)) {
-        return SEEN_NOBODY;
+        return SEEN_NONE;
     }
-    if (holder.uid == NOBODY) {
+    if (holder.uid == NO_USER) {
         return SEEN_UNKNOWN;
     }
     if (!sock_owners_have(&self->owners, holder.uid)) {
-        return SEEN_NOBODY;
+        return SEEN_NONE;
     }
     *out_holder = holder;
     return comes_first(self, holder.uid, place) ? SEEN_EARLIER : SEEN_LATER;
@@ -206,10 +206,10 @@ static seen_t look_at(const gw_bus_names_t *self, uid_t uid, unsigned place, gw_
 /// Checks the places of all users who may run a gateway, and returns the most important result.
 static seen_t survey(const gw_bus_names_t *self, gw_holder_t *out_holder) {
     const uid_t users[] = {0, self->owners.service, self->owners.own};
-    seen_t seen = look_at(self, self->owners.own, 0U, out_holder);
+    seen_t seen = check_place(self, self->owners.own, 0U, out_holder);
     for (size_t i = 0; i < sizeof users / sizeof users[0]; i++) {
         for (unsigned place = 1; place < GW_BUS_PLACES && seen != SEEN_EARLIER; place++) {
-            const seen_t one = look_at(self, users[i], place, out_holder);
+            const seen_t one = check_place(self, users[i], place, out_holder);
             if (one > seen) {
                 seen = one;
             }
@@ -226,7 +226,7 @@ int gw_bus_names_take(gw_bus_names_t *self, gw_holder_t *out_holder, gw_holder_t
     }
     const iw_time_us_t until_us = iwl_clock_now_us() + GW_BUS_PATIENCE_US;
     seen_t seen = survey(self, out_holder);
-    while (seen != SEEN_NOBODY && seen != SEEN_EARLIER && iwl_clock_now_us() < until_us) {
+    while (seen != SEEN_NONE && seen != SEEN_EARLIER && iwl_clock_now_us() < until_us) {
         (void)nanosleep(&again, NULL);
         seen = survey(self, out_holder);
     }
@@ -246,7 +246,7 @@ bool gw_bus_names_poll(gw_bus_names_t *self, gw_holder_t *out_holder) {
         }
         (void)close(fd);
     }
-    const seen_t seen = first ? SEEN_NOBODY : survey(self, out_holder);
+    const seen_t seen = first ? SEEN_NONE : survey(self, out_holder);
     return (seen == SEEN_EARLIER || seen == SEEN_LATER) && out_holder->uid != self->owners.own;
 }
 

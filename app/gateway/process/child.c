@@ -67,7 +67,7 @@ bool gw_child_revive(gw_child_t *self) {
     return self->fd >= 0;
 }
 
-bool gw_child_say(const gw_child_t *self, const void *message, size_t length) {
+bool gw_child_send(const gw_child_t *self, const void *message, size_t length) {
     return send(self->fd, message, length, MSG_DONTWAIT | MSG_NOSIGNAL) == (ssize_t)length;
 }
 
@@ -84,7 +84,7 @@ gw_child_news_t gw_child_receive(gw_child_t *self, void *out_message, size_t siz
         return GW_CHILD_ENDED;
     }
     *out_length = (size_t)got;
-    return GW_CHILD_SAID;
+    return GW_CHILD_MESSAGE;
 }
 
 void gw_child_close(gw_child_t *self) {

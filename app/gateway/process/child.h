@@ -35,7 +35,7 @@ typedef struct {
 
 typedef enum {
     GW_CHILD_SILENT = 0,
-    GW_CHILD_SAID,
+    GW_CHILD_MESSAGE,
     GW_CHILD_ENDED, ///< The child has ended; earlier messages have no reply. Reported once.
 } gw_child_news_t;
 
@@ -46,9 +46,9 @@ int gw_child_start(gw_child_t *self, const gw_child_work_t *work);
 bool gw_child_revive(gw_child_t *self);
 
 /// Sends a message. Returns false and sets errno if it cannot: the child has ended, or has too many messages (EAGAIN).
-bool gw_child_say(const gw_child_t *self, const void *message, size_t length);
+bool gw_child_send(const gw_child_t *self, const void *message, size_t length);
 
-/// Receives the next message. GW_CHILD_SAID: `*out_length` is its length. Never waits. A message longer than `size` is
+/// Receives the next message. GW_CHILD_MESSAGE: `*out_length` is its length. Never waits. A message longer than `size` is
 /// truncated.
 gw_child_news_t gw_child_receive(gw_child_t *self, void *out_message, size_t size, size_t *out_length);
 

@@ -38,20 +38,20 @@ static void judge_config(const gateway_config_t *config, inspect_findings_t *fin
     char unset[64];
     name_unset(&config->core, unset, sizeof unset);
     if (config->core.listen_only) {
-        inspect_say(findings, "config", INSPECT_OK,
+        inspect_add(findings, "config", INSPECT_OK,
                     "listen only: setpoint type, current role and track are not needed");
     } else if (unset[0] == '\0') {
-        inspect_say(findings, "config", INSPECT_OK, "setpoint type %u, current role %s, track %u mm",
+        inspect_add(findings, "config", INSPECT_OK, "setpoint type %u, current role %s, track %u mm",
                     config->core.setpoint_type, (config->core.current_role == IW_ROLE_LIMIT) ? "limit" : "setpoint",
                     config->core.track_mm);
     } else {
-        inspect_say(findings, "config", INSPECT_WARN,
+        inspect_add(findings, "config", INSPECT_WARN,
                     "%s not configured: the gateway starts and listens, arm will be refused", unset);
         inspect_fix(findings,
                     "set it under [wheels] in the configuration; if it is unknown: iwheelctl bringup finds it");
     }
     const iw_stop_budget_t budget = iw_config_stop_budget(&config->core);
-    inspect_say(findings, "budget", INSPECT_OK,
+    inspect_add(findings, "budget", INSPECT_OK,
                 "stop budget: client lost %u ms, %u mm; gateway killed %u ms, %u mm at full command, then unknown",
                 (unsigned)budget.client_lost_ms, (unsigned)budget.client_lost_mm, (unsigned)budget.killed_ms,
                 (unsigned)budget.killed_mm);
@@ -104,7 +104,7 @@ static void fix_directory(const char *path, const char *key, int error, inspect_
 }
 
 /// Adds a message that the start prints, which ends with a fix.
-static void say_printed(char *text, inspect_verdict_t verdict, inspect_findings_t *findings) {
+static void add_printed(char *text, inspect_verdict_t verdict, inspect_findings_t *findings) {
     static const char *const prefixes[] = {"iwheel-gateway: ", "warning: "};
     char *what = text;
     for (size_t i = 0; i < sizeof prefixes / sizeof prefixes[0]; i++) {
@@ -116,7 +116,7 @@ static void say_printed(char *text, inspect_verdict_t verdict, inspect_findings_
     if (fix != NULL) {
         *fix = '\0';
     }
-    inspect_say(findings, "socket", verdict, "%s", what);
+    inspect_add(findings, "socket", verdict, "%s", what);
     inspect_fix(findings, "%s", (fix != NULL) ? fix + 2 : "choose another with --socket");
 }
 
@@ -148,15 +148,15 @@ static void judge_socket(const sock_listener_config_t *wanted, inspect_findings_
     const bool new = is_to_be_made(path, &error);
     const int result = (new || error != 0) ? 0 : judge_place(wanted, text, sizeof text, &error);
     if (result != 0) {
-        say_printed(text, trouble, findings);
+        add_printed(text, trouble, findings);
     } else if (error != 0) {
-        inspect_say(findings, "socket", trouble, "socket %s: directory %s: %s", wanted->path, path, strerror(error));
+        inspect_add(findings, "socket", trouble, "socket %s: directory %s: %s", wanted->path, path, strerror(error));
         fix_directory(path, (wanted->right == SOCK_DRIVE) ? "[northbound] socket" : "[northbound] watch_socket", error,
                       findings);
     } else if (text[0] != '\0') {
-        say_printed(text, INSPECT_WARN, findings);
+        add_printed(text, INSPECT_WARN, findings);
     } else {
-        inspect_say(findings, "socket", INSPECT_OK, "socket: directory %s %s", path,
+        inspect_add(findings, "socket", INSPECT_OK, "socket: directory %s %s", path,
                     new ? "will be created" : "can be written");
     }
 }
@@ -166,7 +166,7 @@ static void judge_socket(const sock_listener_config_t *wanted, inspect_findings_
 static void judge_record(const char *path, inspect_findings_t *findings) {
     int error = 0;
     if (is_to_be_made(path, &error) && error == 0) {
-        inspect_say(findings, "record", INSPECT_OK, "record: directory %s will be created", path);
+        inspect_add(findings, "record", INSPECT_OK, "record: directory %s will be created", path);
         return;
     }
     const int directory = (error == 0) ? sock_folder_open_own(path) : -1;
@@ -177,10 +177,10 @@ static void judge_record(const char *path, inspect_findings_t *findings) {
         (void)close(directory);
     }
     if (error == 0) {
-        inspect_say(findings, "record", INSPECT_OK, "record: directory %s can be written", path);
+        inspect_add(findings, "record", INSPECT_OK, "record: directory %s can be written", path);
         return;
     }
-    inspect_say(findings, "record", INSPECT_WARN,
+    inspect_add(findings, "record", INSPECT_WARN,
                 "record: directory %s: %s: the gateway starts, but records no stop and stores no assumption", path,
                 sock_folder_fault(error));
     fix_directory(path, "[record] directory", error, findings);
@@ -191,10 +191,10 @@ static void judge_record(const char *path, inspect_findings_t *findings) {
 /// Checks a group. `may`: rights of the group by this key of [northbound].
 static void judge_group(const char *key, const char *group, const char *may, inspect_findings_t *findings) {
     if (strcmp(group, "none") == 0 || getgrnam(group) != NULL) {
-        inspect_say(findings, key, INSPECT_OK, "group %s may %s", group, may);
+        inspect_add(findings, key, INSPECT_OK, "group %s may %s", group, may);
         return;
     }
-    inspect_say(findings, key, INSPECT_WARN, "group %s does not exist: the socket%s will have the gateway's own group",
+    inspect_add(findings, key, INSPECT_WARN, "group %s does not exist: the socket%s will have the gateway's own group",
                 group, (strcmp(key, "watch_group") == 0) ? " for watching" : "");
     inspect_fix(findings, "sudo groupadd --system %s, or set [northbound] %s to another, or to none", group, key);
 }
@@ -209,7 +209,7 @@ static void judge_rights(const gateway_config_t *config, inspect_findings_t *fin
         judge_group("group", config->northbound.group, "use the socket", findings);
     }
     if ((config->northbound.mode & S_IWOTH) != 0U) {
-        inspect_say(findings, "mode", INSPECT_WARN, "socket mode %04o: every user of this machine may move the wheels",
+        inspect_add(findings, "mode", INSPECT_WARN, "socket mode %04o: every user of this machine may move the wheels",
                     (unsigned)config->northbound.mode);
         inspect_fix(findings, "set [northbound] mode = 0660");
     }

@@ -19,18 +19,19 @@ static void report_angles(const gateway_config_t *config, sock_log_t *log) {
         return;
     }
     const gw_angles_t angles = gw_angles(config);
+    sock_log(log, SOCK_LOG_INFO,
+             "angle budget, zero without ramp: the machine turns by %u.%u degrees if a wheel is blocked, by %u.%u if "
+             "it is slow (assumes %u mm/s2, not measured)",
+             TENTHS(angles.blocked), TENTHS(angles.slow), GW_ANGLES_BRAKE_MM_S2);
     sock_log(
         log, SOCK_LOG_INFO,
-        "angle budget, zero without ramp: a wheel blocked %u.%u degrees, slow %u.%u, at %u mm/s2 assumed, not measured",
-        TENTHS(angles.blocked), TENTHS(angles.slow), GW_ANGLES_BRAKE_MM_S2);
-    sock_log(
-        log, SOCK_LOG_INFO,
-        "angle budget, ramp: a wheel coasting %u.%u degrees, at %u mm/s2 assumed, not measured; late by 100 ms %u.%u",
+        "angle budget, ramp: the machine turns by %u.%u degrees if a wheel coasts (assumes %u mm/s2, not measured), by "
+        "%u.%u if it follows 100 ms late",
         TENTHS(angles.coasting), GW_ANGLES_COAST_MM_S2, TENTHS(angles.late));
-    sock_log(
-        log, SOCK_LOG_INFO,
-        "angle budget, unbounded: a wheel running on %u.%u degrees a second; up to %u.%u a second are not detected",
-        TENTHS(angles.runs_on), TENTHS(angles.unnoticed));
+    sock_log(log, SOCK_LOG_INFO,
+             "angle budget, unbounded: the machine turns by %u.%u degrees per second if only one wheel drives; up to "
+             "%u.%u per second are not detected",
+             TENTHS(angles.runs_on), TENTHS(angles.unnoticed));
 }
 
 void gw_report_start(const gateway_config_t *config, bool simulated, bool watched, sock_log_t *log) {

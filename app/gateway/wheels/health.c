@@ -8,7 +8,7 @@
 /// Reads the last battery voltage or temperature of a wheel. Returns false if it is not known.
 static bool find_value(const iw_snapshot_t *seen, iw_side_t side, gw_ailment_t ailment, unsigned *out_value) {
     const iw_snapshot_wheel_t *wheel = &seen->wheel[side];
-    const iw_codec_status_t *status = &wheel->told->status;
+    const iw_codec_status_t *status = &wheel->telemetry->status;
     const bool warm = ailment == GW_TEMPERATURE_HIGH;
     if (wheel->status_us == IW_NEVER || seen->at_us - wheel->status_us > GW_HEALTH_FRESH_US ||
         (warm && status->temperature_degC > IW_TEMPERATURE_MAX_degC)) {
@@ -39,7 +39,7 @@ static void judge(gw_health_t *self, const iw_snapshot_t *seen, iw_side_t side, 
     }
 }
 
-void gw_health_look(gw_health_t *self, const iw_snapshot_t *seen) {
+void gw_health_check(gw_health_t *self, const iw_snapshot_t *seen) {
     for (unsigned side = 0; side < IW_SIDES; side++) {
         judge(self, seen, (iw_side_t)side, GW_BATTERY_LOW);
         judge(self, seen, (iw_side_t)side, GW_TEMPERATURE_HIGH);

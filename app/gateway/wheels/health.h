@@ -34,7 +34,7 @@ typedef struct {
 } gw_health_t;
 
 /// Judges the last status messages.
-void gw_health_look(gw_health_t *self, const iw_snapshot_t *seen);
+void gw_health_check(gw_health_t *self, const iw_snapshot_t *seen);
 
 /// Describes a fault that is present: "the left wheel's battery has 228 dV, below battery_low_dV 230".
 void gw_health_sentence(const gw_health_t *self, const iw_snapshot_t *seen, iw_side_t side, gw_ailment_t ailment,

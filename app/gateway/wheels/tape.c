@@ -4,9 +4,9 @@
 #include <string.h>
 
 /// Number of entries to search for frames among requests and steps.
-#define LOOK_BACK ((uint64_t)8U * GW_AROUND)
-#define UNTOLD    0xFFU
-#define AGAIN_US  1000000U
+#define READ_BACK  ((uint64_t)8U * GW_AROUND)
+#define UNREPORTED 0xFFU
+#define AGAIN_US   1000000U
 /// Bits of `facts`.
 #define TIMING 1U
 #define ECHO   2U
@@ -14,7 +14,7 @@
 void gw_tape_init(gw_tape_t *self, blackbox_ring_t *ring) {
     memset(self, 0, sizeof *self);
     self->ring = ring;
-    self->facts = UNTOLD;
+    self->facts = UNREPORTED;
     self->after_count = GW_AROUND; // No frames are awaited.
 }
 
@@ -159,7 +159,7 @@ void gw_tape_drive(gw_tape_t *self, const blackbox_entry_t *entry, const iw_driv
 }
 
 void gw_tape_mark(gw_tape_t *self) {
-    static blackbox_entry_t last[LOOK_BACK]; // Too large for a stack.
+    static blackbox_entry_t last[READ_BACK]; // Too large for a stack.
     size_t count = 0;
     self->before_count = 0;
     self->after_count = 0;
@@ -167,7 +167,7 @@ void gw_tape_mark(gw_tape_t *self) {
         return;
     }
     const uint64_t written = blackbox_ring_written(self->ring);
-    (void)blackbox_ring_copy(self->ring, (written > LOOK_BACK) ? written - LOOK_BACK : 0U, written, last, &count);
+    (void)blackbox_ring_copy(self->ring, (written > READ_BACK) ? written - READ_BACK : 0U, written, last, &count);
     size_t first = count;
     for (uint32_t frames = 0; first > 0U && frames < GW_AROUND; first--) {
         frames += (last[first - 1U].kind == (uint8_t)BLACKBOX_FRAME) ? 1U : 0U;

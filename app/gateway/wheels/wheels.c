@@ -53,7 +53,7 @@ iw_config_fault_t gw_wheels_begin(gw_wheels_t *self, const iw_config_t *config, 
     return fault;
 }
 
-iw_snapshot_t gw_wheels_look(const gw_wheels_t *self) {
+iw_snapshot_t gw_wheels_snapshot(const gw_wheels_t *self) {
     iw_snapshot_t seen;
     iw_gateway_snapshot(&self->core, self->now_us, &seen);
     return seen;
@@ -89,7 +89,7 @@ iw_snapshot_t gw_wheels_step(gw_wheels_t *self) {
     self->step_us = iw_gateway_step(&self->core, self->now_us);
     gw_tape_step_end(&self->tape);
     self->requested = false;
-    const iw_snapshot_t seen = gw_wheels_look(self);
+    const iw_snapshot_t seen = gw_wheels_snapshot(self);
     gw_gaps_note(&self->gaps, seen.sent);
     return seen;
 }
@@ -123,7 +123,7 @@ static void note_assumption(gw_wheels_t *self, iw_assumption_item_t item, const 
 
 void gw_wheels_set_assumption(gw_wheels_t *self, iw_assumption_item_t item, const iw_assumption_entry_t *entry) {
     iw_gateway_set_assumption(&self->core, item, entry);
-    note_assumption(self, item, &gw_wheels_look(self).assumed[item]);
+    note_assumption(self, item, &gw_wheels_snapshot(self).assumed[item]);
 }
 
 void gw_wheels_note(gw_wheels_t *self, uint32_t number, const blackbox_entry_t *entry) {
@@ -152,7 +152,7 @@ void gw_wheels_note_state(gw_wheels_t *self, const iw_snapshot_t *seen, iw_state
 
 void gw_wheels_note_again(gw_wheels_t *self) {
     if (gw_tape_again(&self->tape, self->now_us)) {
-        const iw_snapshot_t seen = gw_wheels_look(self);
+        const iw_snapshot_t seen = gw_wheels_snapshot(self);
         gw_wheels_note_state(self, &seen, seen.state);
         if (seen.doubt != IW_ASSUMPTION_ITEMS) {
             note_assumption(self, seen.doubt, &seen.assumed[seen.doubt]);
@@ -173,7 +173,7 @@ static void write_frames(iwn_out_t *json, const char *name, const blackbox_entry
 }
 
 void gw_wheels_write_around(const gw_wheels_t *self, iwn_out_t *json) {
-    const bool any = gw_wheels_look(self).stop->number != 0U;
+    const bool any = gw_wheels_snapshot(self).stop->number != 0U;
     write_frames(json, "frames_before", self->tape.before, self->tape.before_count);
     write_frames(json, "frames_after", self->tape.after, any ? self->tape.after_count : 0U);
 }

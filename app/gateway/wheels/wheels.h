@@ -71,7 +71,7 @@ typedef struct gw_wheels {
 iw_config_fault_t gw_wheels_begin(gw_wheels_t *self, const iw_config_t *config, blackbox_ring_t *ring, bool restarted);
 
 /// Returns a snapshot. Call it again after a step or a request.
-iw_snapshot_t gw_wheels_look(const gw_wheels_t *self);
+iw_snapshot_t gw_wheels_snapshot(const gw_wheels_t *self);
 
 /// Sets the time after a clock was read.
 void gw_wheels_time(gw_wheels_t *self, iw_time_us_t now_us);

@@ -161,14 +161,15 @@ iw_side_t iw_codec_side(uint32_t id);
 iw_codec_kind_t iw_codec_decode(const iw_can_frame_t *frame, iw_codec_wheel_t wheel[IW_SIDES]);
 
 /// Encodes the message `kind` of `side` from the values of `*wheel`. The frame has the table's length, zero bytes after
-/// it, and kind IW_CAN_RECEIVED. Returns IW_ERR_ID if there is no such message (a pose of the left wheel). Clamps the
-/// current of a setpoint like `iw_codec_encode_setpoint`.
+/// it, and kind IW_CAN_RECEIVED. Returns IW_ERR_ID and leaves `*out_frame` unchanged if there is no such message (a
+/// pose of the left wheel, or `kind` >= IW_CODEC_KINDS). Clamps the current of a setpoint like
+/// `iw_codec_encode_setpoint`.
 iw_status_t iw_codec_encode(iw_codec_kind_t kind, iw_side_t side, const iw_codec_wheel_t *wheel,
                             iw_can_frame_t *out_frame);
 
-/// Encodes a setpoint of `dlc` bytes (5..8, not checked), with zeros in bytes 5 to 7 and kind IW_CAN_RECEIVED. Clamps
-/// the current to +/- IW_CURRENT_LIMIT_mA, which is the last check before the bus; does not limit the speed. Always
-/// writes `*out_frame`. Returns true if it clamped the current; the caller counts that.
+/// Encodes a setpoint of `dlc` bytes, with zeros in bytes 5 to 7 and kind IW_CAN_RECEIVED. `side` and `dlc` (5..8) are
+/// not checked. Clamps the current to +/- IW_CURRENT_LIMIT_mA, which is the last check before the bus; does not limit
+/// the speed. Always writes `*out_frame`. Returns true if it clamped the current; the caller counts that.
 bool iw_codec_encode_setpoint(iw_side_t side, const iw_codec_setpoint_t *setpoint, uint8_t dlc,
                               iw_can_frame_t *out_frame);
 

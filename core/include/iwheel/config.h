@@ -45,10 +45,10 @@ typedef struct {
     uint16_t follow_mm_s;     ///< A wheel that is faster than its applied speed by this, 50..500, at 192 mm radius ...
     uint16_t follow_ms;       ///< ... for this time, 100..1000, causes a latch.
     uint16_t blocked_ms;      ///< A wheel below 20 % of its command for this time, 200..2000, stops the pair.
-    uint16_t pair_mm;         ///< A deviation from the commanded path, right minus left, by this, 20..150 ...
-    uint16_t pair_leak_ms;    ///< ... within about this time, 500..3000, stops the pair.
-    uint16_t wheel_lag_ms;    ///< Time constant with which a wheel follows its setpoint, 10..300.
-    uint16_t max_yaw_mrad_s;  ///< Largest yaw rate, 50..10000. The core scales faster commands by one factor.
+    uint16_t pair_mm;        ///< Deviation from the commanded path, right minus left, at which the pair stops: 20..150.
+    uint16_t pair_leak_ms;   ///< Time constant with which a deviation decays, 500..3000.
+    uint16_t wheel_lag_ms;   ///< Time constant with which a wheel follows its setpoint, 10..300.
+    uint16_t max_yaw_mrad_s; ///< Largest yaw rate, 50..10000. The core scales faster commands by one factor.
     uint16_t yaw_accel_mrad_s2; ///< Largest growth of the yaw rate by a drive command, 100..10000. It slows no stop.
     uint16_t track_mm;          ///< Distance between the wheels, 200..1500. 0: not configured, the wheels do not move.
     uint16_t radius_mm;         ///< Radius of the wheel, 60..400. Document: "approximately 192".

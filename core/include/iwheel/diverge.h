@@ -12,6 +12,9 @@
 ///
 /// Millimetres and mm/s are those of setpoints, at IW_SETPOINT_RADIUS_MM.
 ///
+/// Pure state machine: no I/O, no clock, no heap, and no function fails. The caller owns `iw_diverge_t` and uses one
+/// instance in one context only.
+///
 /// The best reaction depends on the fault. A blocked wheel turns the machine as long as the other wheel runs: the core
 /// commands zero immediately. A wheel that runs on turns the machine as long as it is faster: the core ramps both down.
 #ifndef IW_DIVERGE_H
@@ -64,13 +67,17 @@ void iw_diverge_init(iw_diverge_t *self, const iw_config_t *config);
 void iw_diverge_begin(iw_diverge_t *self, iw_time_us_t begun_us);
 
 /// Sets the deviation to zero while nothing is compared: the core does not drive, a wheel sends no telemetry, a step is
-/// late, or a stop without ramp is active. The expected speeds continue from the measured ones.
+/// late, or a stop without ramp is active. The expected speeds continue from the measured ones, `largest_um` stays.
 void iw_diverge_restart(iw_diverge_t *self, iw_time_us_t now_us);
 
-/// Sets the measured speed of a wheel, in the machine's frame.
+/// Sets the measured speed of a wheel in the machine's frame, limited to +/- 40 000 mm/s. `side`: an iw_side_t, not
+/// checked.
 void iw_diverge_receive(iw_diverge_t *self, size_t side, int32_t measured_mm_s);
 
-/// Compares the applied and measured speeds since the last step, and returns the result.
+/// Compares the applied and measured speeds since the last comparison, and returns the result. Call it in every step
+/// of the core, at `now_us` that does not decrease. Less than IW_DIVERGE_STEP_US after the last comparison it only
+/// returns the present result; more than 50 ms count as 50 ms. It sets `side`, `path_um` (+/- 1 m at most) and
+/// `largest_um`.
 iw_diverge_verdict_t iw_diverge_step(iw_diverge_t *self, iw_time_us_t now_us);
 
 #ifdef __cplusplus

@@ -124,7 +124,7 @@ typedef struct {
     uint8_t count;                           ///< Number of samples in the ring.
     uint8_t still;                           ///< Number of newest samples in a row from a wheel at standstill.
     uint8_t next;                            ///< Index of the next sample.
-    bool wheel_offset_heard;                 ///< The wheel has sent its offset in this run.
+    bool wheel_offset_received;              ///< The wheel has sent its offset in this run.
     bool boot_seen;                          ///< The start of this run was observed.
     iw_force_unit_t unit;                    ///< Configured unit of `raw`.
     iw_offset_provenance_t provenance;       ///< Source of the offset in use.

@@ -76,26 +76,26 @@ typedef struct iw_gateway {
     /// Nothing is sent, but an unconfirmed setpoint is still in a controller: the port cannot purge it, or has not
     /// purged it within IW_GATEWAY_LOST_ECHO_US. It may reach the bus when the wheels get power.
     bool left_behind;
-    uint32_t purged_stop;              ///< Number of the last stop during whose zeros the core called `purge`.
-    iw_counters_t counters;            ///< Counters since init.
-    iw_config_t config;                ///< Copy of the configuration.
-    iw_hal_t hal;                      ///< Copy of the HAL.
-    iw_time_us_t now_us;               ///< Time of this step.
-    iw_time_us_t promised_us;          ///< Time at which the next step is due.
-    iw_time_us_t suspended_us;         ///< Suspended time from `iw_gateway_suspended` since the last step.
-    iw_time_us_t stalled_since_us;     ///< Due time of the first step in a run of stalled steps.
-    iw_time_us_t pose_us;              ///< Time of the last pose; IW_NEVER if there is none.
-    iw_time_us_t purged_us;            ///< Time of the last purge while nothing is sent; IW_NEVER if there is none.
-    iw_setpoint_t setpoint;            ///< Scheduler of setpoint pairs.
-    iw_permit_t permit;                ///< Permission to move.
-    iw_sender_t sender;                ///< Transmission of pairs and their echoes.
-    iw_wheel_t wheel[IW_SIDES];        ///< State of each wheel.
-    iw_follow_t follow[IW_SIDES];      ///< Comparison of each wheel's speed with its command.
-    iw_diverge_t diverge;              ///< Comparison of the pair's path with the commanded path.
-    iw_rolling_t rolling;              ///< Detection of wheels that turn without a command.
-    iw_codec_wheel_t told[IW_SIDES];   ///< Last telemetry of each wheel, by message.
-    iw_force_t force[IW_SIDES];        ///< Normal force on each wheel.
-    iw_assumption_store_t assumptions; ///< Assumptions about the wheels.
+    uint32_t purged_stop;                 ///< Number of the last stop during whose zeros the core called `purge`.
+    iw_counters_t counters;               ///< Counters since init.
+    iw_config_t config;                   ///< Copy of the configuration.
+    iw_hal_t hal;                         ///< Copy of the HAL.
+    iw_time_us_t now_us;                  ///< Time of this step.
+    iw_time_us_t promised_us;             ///< Time at which the next step is due.
+    iw_time_us_t suspended_us;            ///< Suspended time from `iw_gateway_suspended` since the last step.
+    iw_time_us_t stalled_since_us;        ///< Due time of the first step in a run of stalled steps.
+    iw_time_us_t pose_us;                 ///< Time of the last pose; IW_NEVER if there is none.
+    iw_time_us_t purged_us;               ///< Time of the last purge while nothing is sent; IW_NEVER if there is none.
+    iw_setpoint_t setpoint;               ///< Scheduler of setpoint pairs.
+    iw_permit_t permit;                   ///< Permission to move.
+    iw_sender_t sender;                   ///< Transmission of pairs and their echoes.
+    iw_wheel_t wheel[IW_SIDES];           ///< State of each wheel.
+    iw_follow_t follow[IW_SIDES];         ///< Comparison of each wheel's speed with its command.
+    iw_diverge_t diverge;                 ///< Comparison of the pair's path with the commanded path.
+    iw_rolling_t rolling;                 ///< Detection of wheels that turn without a command.
+    iw_codec_wheel_t telemetry[IW_SIDES]; ///< Last telemetry of each wheel, by message.
+    iw_force_t force[IW_SIDES];           ///< Normal force on each wheel.
+    iw_assumption_store_t assumptions;    ///< Assumptions about the wheels.
 } iw_gateway_t;
 
 /// Checks the configuration, copies it and the HAL, and enters LISTENING. `restarted`: the previous process died while

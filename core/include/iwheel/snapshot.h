@@ -42,10 +42,10 @@ typedef struct {
 
 /// One wheel. Speeds in mm/s and distances are in the machine's frame (`invert` applied), rpm and ticks in the wheel's.
 typedef struct {
-    const iw_codec_wheel_t *told; ///< Last telemetry by message, as on the bus.
-    const iw_force_t *force;      ///< Normal force and its offset.
-    iw_time_us_t speed_us;        ///< Reception time of the last speed message; IW_NEVER if there is none.
-    iw_time_us_t status_us;       ///< The same for the status message. After a reboot IW_NEVER until the next one.
+    const iw_codec_wheel_t *telemetry; ///< Last telemetry by message, as on the bus.
+    const iw_force_t *force;           ///< Normal force and its offset.
+    iw_time_us_t speed_us;             ///< Reception time of the last speed message; IW_NEVER if there is none.
+    iw_time_us_t status_us;            ///< The same for the status message. After a reboot IW_NEVER until the next one.
     int64_t ticks;         ///< Odometry without wraps, across reboots. The distance in nm is `ticks * nm_per_tick`.
     int32_t nm_per_tick;   ///< Distance of one tick in nm. Negative if `invert` is set.
     int32_t speed_mm_s;    ///< Measured speed, rounded towards zero. Valid only if `heard`.

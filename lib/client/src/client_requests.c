@@ -2,6 +2,8 @@
 // Composes, numbers and sends requests, and waits for replies.
 #include "connection.h"
 
+#include "iwheel_northbound/text.h"
+
 #include <poll.h>
 #include <stdio.h>
 #include <string.h>
@@ -202,12 +204,6 @@ static bool add_text(request_t *self, const char *key, const char *text, size_t 
     return true;
 }
 
-static iwc_result_t ask_plainly(iwc_t *self, const char *cmd, int timeout_ms) {
-    request_t request = begin_request(cmd);
-    add(&request, "}");
-    return iwc_ask(self, request.text, timeout_ms, NULL);
-}
-
 iwc_result_t iwc_status(iwc_t *self, int timeout_ms, iwc_state_t *out_state) {
     iwc_message_t reply;
     const iwc_result_t result = iwc_ask(self, "{\"cmd\":\"status\"}", timeout_ms, &reply);
@@ -328,23 +324,25 @@ static iwc_result_t or_close(iwc_t *self, iwc_result_t result) {
 }
 
 iwc_result_t iwc_stop(iwc_t *self, int timeout_ms) {
-    return or_close(self, ask_plainly(self, "stop", timeout_ms));
+    return or_close(self, iwc_ask(self, "{\"cmd\":\"stop\"}", timeout_ms, NULL));
 }
 
-/// Returns false if a request may not contain the reason.
-static bool begin_estop(request_t *out_request, const char *reason) {
-    *out_request = begin_request("estop");
-    if (!add_text(out_request, "reason", reason, REASON_MAX_BYTES)) {
-        return false;
-    }
-    add(out_request, "}");
-    return true;
+/// Writes an estop with the part of the reason that a request may contain: no reason prevents a stop.
+static request_t estop_request(const char *reason) {
+    request_t request = begin_request("estop");
+    char plain[REASON_MAX_BYTES + 1U];
+    iwn_text_t text = iwn_text_begin(plain, sizeof plain);
+    iwn_text_add(&text, (reason != NULL) ? reason : "");
+    iwn_plain_blank(plain);
+    const bool blank = plain[strspn(plain, " ")] == '\0';
+    (void)add_text(&request, "reason", blank ? NULL : plain, REASON_MAX_BYTES);
+    add(&request, "}");
+    return request;
 }
 
 iwc_result_t iwc_estop(iwc_t *self, const char *reason, int timeout_ms) {
-    request_t request;
-    return begin_estop(&request, reason) ? or_close(self, iwc_ask(self, request.text, timeout_ms, NULL))
-                                         : iwc_note(self, IWC_INVALID);
+    const request_t request = estop_request(reason);
+    return or_close(self, iwc_ask(self, request.text, timeout_ms, NULL));
 }
 
 iwc_result_t iwc_stop_at(iwc_t *self, const char *path, int timeout_ms) {
@@ -352,9 +350,8 @@ iwc_result_t iwc_stop_at(iwc_t *self, const char *path, int timeout_ms) {
 }
 
 iwc_result_t iwc_estop_at(iwc_t *self, const char *path, const char *reason, int timeout_ms) {
-    request_t request;
-    return begin_estop(&request, reason) ? iwc_stop_by(self, path, request.text, timeout_ms)
-                                         : iwc_note(self, IWC_INVALID);
+    const request_t request = estop_request(reason);
+    return iwc_stop_by(self, path, request.text, timeout_ms);
 }
 
 iwc_result_t iwc_reset(iwc_t *self, int timeout_ms) {

@@ -11,6 +11,10 @@
 #define ATTEMPT_US 300000
 /// Interval between two rounds of attempts.
 #define AGAIN_US 5000
+/// Longest time for each of several gateways in the first round. A working gateway replies within milliseconds.
+#define ROUND_US 60000
+/// Most gateways of a machine.
+#define GATEWAYS_MAX 64U
 
 /// Writes the path of the gateway's other socket: watch/NAME.sock for NAME.sock, and the reverse. Returns false if it
 /// is too long.
@@ -91,20 +95,54 @@ static iwc_result_t stop_by_either(iwc_t *self, const char *const paths[2], cons
     return restore(&first, self);
 }
 
+static iwc_result_t stop_one(iwc_t *self, const char *path, const char *request, int64_t deadline_us) {
+    char other[PATH_MAX];
+    const char *const paths[2] = {path, find_other(path, other, sizeof other) ? other : NULL};
+    return stop_by_either(self, paths, request, deadline_us);
+}
+
+/// Sends the request to each gateway, in rounds, so that a gateway that hangs delays the others little. `paths` are
+/// `length` bytes, each path with a terminator. Returns IWC_OK if one gateway executed it.
+static iwc_result_t stop_each(iwc_t *self, const char *paths, size_t length, const char *request, int64_t deadline_us) {
+    bool done[GATEWAYS_MAX] = {false};
+    outcome_t failure = {.result = IWC_NOT_THERE};
+    bool executed = false;
+    bool again = true;
+    for (int64_t round_us = ROUND_US; again; round_us *= 2) {
+        unsigned gateway = 0;
+        again = false;
+        for (size_t at = 0; at < length && gateway < GATEWAYS_MAX; at += strlen(paths + at) + 1U, gateway++) {
+            const int64_t end_us = iwc_now_us() + round_us;
+            if (done[gateway]) {
+                continue;
+            }
+            const iwc_result_t result =
+                stop_one(self, paths + at, request, (end_us < deadline_us) ? end_us : deadline_us);
+            done[gateway] = is_settled(self, result) || is_closed_to_us(result);
+            executed = executed || result == IWC_OK;
+            again = again || !done[gateway];
+            if (result != IWC_OK && failure.result == IWC_NOT_THERE) {
+                note_outcome(&failure, self, result);
+            }
+            if (result == IWC_INTERRUPTED) {
+                return result;
+            }
+        }
+        again = again && iwc_now_us() < deadline_us;
+    }
+    return executed ? IWC_OK : restore(&failure, self);
+}
+
 iwc_result_t iwc_stop_by(iwc_t *self, const char *path, const char *request, int timeout_ms) {
     const int64_t deadline_us = iwc_deadline_us(timeout_ms);
-    char found[PATH_MAX];
-    char other[PATH_MAX];
-    if (path == NULL) {
-        const iwc_result_t result = iwc_find(NULL, found, sizeof found);
-        if (result != IWC_OK) {
-            iwc_close(self);
-            return iwc_note(self, result);
-        }
-        path = found;
+    char found[GATEWAYS_MAX * sizeof self->path];
+    size_t length = 0;
+    iwc_result_t result = (path == NULL) ? iwc_find_paths(found, sizeof found, &length) : IWC_OK;
+    if (result == IWC_OK) {
+        result = stop_one(self, (path != NULL) ? path : found, request, deadline_us);
+    } else if (result == IWC_SEVERAL) {
+        result = stop_each(self, found, length, request, deadline_us);
     }
-    const char *const paths[2] = {path, find_other(path, other, sizeof other) ? other : NULL};
-    const iwc_result_t result = stop_by_either(self, paths, request, deadline_us);
     iwc_close(self);
     return iwc_note(self, result);
 }

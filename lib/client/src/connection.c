@@ -53,7 +53,7 @@ const char *iwc_words(iwc_result_t result) {
         [IWC_INTERRUPTED] = "a signal ended the wait",
         [IWC_REFUSED] = "the gateway refused; its message states cause and fix",
         [IWC_FULL] = "not sent, because the gateway does not read; see its log",
-        [IWC_CLOSED] = "there is no connection; connect, and arm again if the wheels shall turn",
+        [IWC_CLOSED] = "there is no connection; connect, and arm again to drive",
         [IWC_GARBLED] = "this socket does not use the gateway's protocol; check its path and the versions",
         [IWC_NEWER] = "the gateway has a newer protocol; install the libiwheel-client of its version",
         [IWC_INVALID] = "an argument is outside its range; see the contract in iwheel_client/client.h",
@@ -204,14 +204,19 @@ static void take_socket(iwc_t *self, int fd) {
     self->over = IWC_OK;
 }
 
-iwc_result_t iwc_adopt(iwc_t *self, int fd, int timeout_ms) {
+iwc_result_t iwc_adopt_for_stop(iwc_t *self, int fd) {
     begin(self);
     const int flags = fcntl(fd, F_GETFL);
     if (flags < 0 || fcntl(fd, F_SETFL, flags | O_NONBLOCK) != 0 || fcntl(fd, F_SETFD, FD_CLOEXEC) != 0) {
         return iwc_note(self, IWC_INVALID);
     }
     take_socket(self, fd);
-    return iwc_note(self, greet(self, iwc_deadline_us(timeout_ms)));
+    return IWC_OK;
+}
+
+iwc_result_t iwc_adopt(iwc_t *self, int fd, int timeout_ms) {
+    const iwc_result_t result = iwc_adopt_for_stop(self, fd);
+    return (result == IWC_OK) ? iwc_note(self, greet(self, iwc_deadline_us(timeout_ms))) : result;
 }
 
 static iwc_result_t meaning_of(int error) {

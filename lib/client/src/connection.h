@@ -73,7 +73,11 @@ iwc_result_t iwc_note(iwc_t *self, iwc_result_t result);
 /// Stores name and message of a refusal for `iwc_error` and `iwc_reason`.
 void iwc_store_refusal(iwc_t *self, const iwc_message_t *reply);
 
-/// Sends a stop request through a connection of its own, to one of the gateway's two sockets: client_stop.c.
+/// Finds as `iwc_find` does with NULL, but writes a terminator behind each path. `*out_length` is the length of all.
+iwc_result_t iwc_find_paths(char *out, size_t size, size_t *out_length);
+
+/// Sends a stop request through a connection of its own, to one of the gateway's two sockets: client_stop.c. Without
+/// `path` and with several gateways it sends the request to each of them.
 iwc_result_t iwc_stop_by(iwc_t *self, const char *path, const char *request, int timeout_ms);
 
 // ---- the lines in the buffer: client_queue.c

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Finds the gateway if the caller names none, and the socket through which this user may reach it.
-#include "iwheel_client/client.h"
+#include "connection.h"
 
 #include <dirent.h>
 #include <errno.h>
@@ -9,6 +9,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/socket.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -22,23 +23,44 @@ static bool is_socket(const char *path) {
            stat(path, &status) == 0 && S_ISSOCK(status.st_mode);
 }
 
-/// Sockets found in a directory.
+/// Sockets found in a directory: paths, each with a terminator.
 typedef struct {
     char *out;
     size_t size;
     size_t used;
     unsigned count;
+    bool live_only; ///< Leave out sockets on which no program listens.
 } found_t;
 
 static void note_found(found_t *self, const char *path) {
-    const int n = snprintf(self->out + self->used, self->size - self->used, "%s%s", (self->used > 0) ? " " : "", path);
+    const size_t length = strlen(path) + 1U;
     self->count++;
-    self->used += (n > 0 && (size_t)n < self->size - self->used) ? (size_t)n : 0U;
-    self->out[self->used] = '\0';
+    if (length <= self->size - self->used) {
+        memcpy(self->out + self->used, path, length);
+        self->used += length;
+    }
+}
+
+/// Returns false if no program listens on the socket: a gateway that was killed leaves its file behind.
+static bool is_live(const char *path) {
+    struct sockaddr_un address = {.sun_family = AF_UNIX};
+    const int fd =
+        (strlen(path) < sizeof address.sun_path) ? socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0) : -1;
+    if (fd < 0) {
+        return true;
+    }
+    memcpy(address.sun_path, path, strlen(path));
+    const bool refused = connect(fd, (const struct sockaddr *)&address, sizeof address) != 0 && errno == ECONNREFUSED;
+    (void)close(fd);
+    return !refused;
 }
 
 static bool may_use(const char *path) {
     return faccessat(AT_FDCWD, path, W_OK, AT_EACCESS) == 0;
+}
+
+static bool is_found(const found_t *self, const char *path) {
+    return is_socket(path) && (!self->live_only || is_live(path));
 }
 
 /// Adds the drive socket of a gateway, or its watch socket if the drive socket does not exist or this user may not use
@@ -51,8 +73,8 @@ static void note_gateway(found_t *self, const char *directory, const char *name)
     if (length < 0 || (size_t)length >= sizeof drive || watch_length < 0 || (size_t)watch_length >= sizeof watch) {
         return;
     }
-    const bool has_drive = is_socket(drive);
-    const bool has_watch = is_socket(watch);
+    const bool has_drive = is_found(self, drive);
+    const bool has_watch = is_found(self, watch);
     if (has_watch && (!has_drive || (!may_use(drive) && may_use(watch)))) {
         note_found(self, watch);
     } else if (has_drive) {
@@ -79,25 +101,57 @@ static int find_gateways(found_t *self, const char *directory, bool alone) {
     return 0;
 }
 
-static iwc_result_t find_in(const char *directory, char *out, size_t size) {
-    found_t found = {.out = out, .size = size};
-    const int error = find_gateways(&found, directory, false);
-    (void)find_gateways(&found, directory, true);
-    if (found.count > 0) {
-        return (found.count == 1) ? IWC_OK : IWC_SEVERAL;
+/// Writes the paths of the gateways to `found`. Returns an errno.
+static int search(found_t *found, const char *directory) {
+    const int error = find_gateways(found, directory, false);
+    (void)find_gateways(found, directory, true);
+    return error;
+}
+
+/// Writes the paths of the gateways to `found`. Of several only those on which a program listens count, unless there is
+/// none.
+static iwc_result_t find_in(found_t *found, const char *directory) {
+    const int error = search(found, directory);
+    if (found->count == 0) {
+        return (error == EACCES) ? IWC_DENIED : IWC_NOT_THERE;
     }
-    return (error == EACCES) ? IWC_DENIED : IWC_NOT_THERE;
+    if (found->count > 1) {
+        found_t live = {.out = found->out, .size = found->size, .live_only = true};
+        (void)search(&live, directory);
+        found->count = 1; // The first of the files, if no program listens.
+        if (live.count > 0) {
+            *found = live;
+        }
+    }
+    return (found->count == 1) ? IWC_OK : IWC_SEVERAL;
+}
+
+/// Finds as iwc_find does. Each path in `found` has a terminator.
+static iwc_result_t find_by_name(found_t *found, const char *directory) {
+    const char *named = (directory == NULL) ? getenv("IWHEEL_SOCKET") : NULL;
+    if (found->size == 0) {
+        return IWC_INVALID;
+    }
+    found->out[0] = '\0';
+    if (named != NULL && named[0] != '\0') {
+        note_found(found, named);
+        return (found->used > 0) ? IWC_OK : IWC_INVALID;
+    }
+    return find_in(found, (directory != NULL) ? directory : IWC_DIRECTORY);
+}
+
+iwc_result_t iwc_find_paths(char *out, size_t size, size_t *out_length) {
+    found_t found = {.out = out, .size = size};
+    const iwc_result_t result = find_by_name(&found, NULL);
+    *out_length = found.used;
+    return result;
 }
 
 iwc_result_t iwc_find(const char *directory, char *out, size_t size) {
-    const char *named = (directory == NULL) ? getenv("IWHEEL_SOCKET") : NULL;
-    if (size == 0) {
-        return IWC_INVALID;
+    found_t found = {.out = out, .size = size};
+    const iwc_result_t result = find_by_name(&found, directory);
+    for (size_t i = 0; result == IWC_SEVERAL && i + 1U < found.used; i++) {
+        out[i] = (out[i] == '\0') ? ' ' : out[i];
     }
-    out[0] = '\0';
-    if (named != NULL && named[0] != '\0') {
-        (void)snprintf(out, size, "%s", named);
-        return (strlen(named) < size) ? IWC_OK : IWC_INVALID;
-    }
-    return find_in((directory != NULL) ? directory : IWC_DIRECTORY, out, size);
+    return result;
 }

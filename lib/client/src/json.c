@@ -6,6 +6,9 @@
 
 #include <string.h>
 
+/// Every integer with at most this many digits has 64 bits.
+#define DIGITS_MAX 18U
+
 static const iwc_span_t NOTHING = {NULL, 0};
 
 bool iwc_json_is_object(const char *text, size_t length) {
@@ -16,7 +19,67 @@ bool iwc_json_is_object(const char *text, size_t length) {
     return iwn_json_check(text, length, &work, &root, &fault) && iwn_json_kind(root) == IWN_JSON_OBJECT;
 }
 
+static bool is_digit(char c) {
+    return c >= '0' && c <= '9';
+}
+
+/// Returns the length of the equal beginning of both texts.
+static size_t equal_length(const char *one, const char *other, size_t length) {
+    size_t at = 0;
+    while (at + 8U <= length && memcmp(one + at, other + at, 8U) == 0) { // The compiler makes this one comparison.
+        at += 8U;
+    }
+    while (at < length && one[at] == other[at]) {
+        at++;
+    }
+    return at;
+}
+
+/// Returns the length of an integer with another mark behind it; 0: there is none.
+static size_t integer_length(iwc_span_t text) {
+    const size_t sign = (text.length > 0U && text.at[0] == '-') ? 1U : 0U;
+    size_t at = sign;
+    while (at < text.length && is_digit(text.at[at])) {
+        at++;
+    }
+    const size_t digits = at - sign;
+    const bool ends = at < text.length && (text.at[at] == ',' || text.at[at] == '}' || text.at[at] == ']');
+    const bool good = digits == 1U || (digits > 1U && digits <= DIGITS_MAX && text.at[sign] != '0');
+    return (ends && good) ? at : 0U;
+}
+
+/// Returns true if the text differs from a checked one only in integers, each behind a mark and before a mark. Outside
+/// of strings such an integer is a whole value. In a string it is not part of an escape, and any other digits are valid
+/// there too. The text is therefore valid.
+static bool has_other_integers(iwc_span_t text, iwc_span_t checked) {
+    for (;;) {
+        size_t equal = equal_length(text.at, checked.at, (text.length < checked.length) ? text.length : checked.length);
+        if (equal == text.length || equal == checked.length) {
+            return text.length == checked.length;
+        }
+        while (equal > 0U && (is_digit(text.at[equal - 1U]) || text.at[equal - 1U] == '-')) {
+            equal--; // To the beginning of the integer.
+        }
+        if (equal == 0U || (text.at[equal - 1U] != ':' && text.at[equal - 1U] != ',' && text.at[equal - 1U] != '[')) {
+            return false;
+        }
+        text = (iwc_span_t){text.at + equal, text.length - equal};
+        checked = (iwc_span_t){checked.at + equal, checked.length - equal};
+        const size_t here = integer_length(text);
+        const size_t there = integer_length(checked);
+        if (here == 0U || there == 0U) {
+            return false;
+        }
+        text = (iwc_span_t){text.at + here, text.length - here};
+        checked = (iwc_span_t){checked.at + there, checked.length - there};
+    }
+}
+
 bool iwc_json_is_trusted_object(const char *text, size_t length, iwc_stored_t *stored) {
+    if (length <= IWC_STORED_MAX && stored->text_length > 0U &&
+        has_other_integers((iwc_span_t){text, length}, (iwc_span_t){stored->text, stored->text_length})) {
+        return true;
+    }
     char reason[1];
     iwn_text_t fault = iwn_text_begin(reason, sizeof reason);
     iwn_repeated_t repeated = {.value = stored->value, .length = stored->length};
@@ -28,6 +91,11 @@ bool iwc_json_is_trusted_object(const char *text, size_t length, iwc_stored_t *s
     if (value.length > 0 && value.length <= IWC_STORED_MAX && value.at[0] == '{') {
         memcpy(stored->value, value.at, value.length);
         stored->length = value.length;
+        repeated.met = true;
+    }
+    if (repeated.met && length <= IWC_STORED_MAX) {
+        memcpy(stored->text, text, length);
+        stored->text_length = length;
     }
     return true;
 }

@@ -13,20 +13,23 @@ typedef struct {
     size_t length;
 } iwc_span_t;
 
-/// Size of the longest stored value.
+/// Size of the longest stored value, and of the longest stored text.
 #define IWC_STORED_MAX 8192U
 
-/// The value of the field `ledger` of the last event `state`: half of the event, and mostly equal to the one before.
+/// An event `state`, and the value of its field `ledger`: half of the event, and mostly equal to the one before.
 typedef struct {
     size_t length; ///< 0: none.
     char value[IWC_STORED_MAX];
+    size_t text_length; ///< 0: none.
+    char text[IWC_STORED_MAX];
 } iwc_stored_t;
 
 /// Returns true if the text is one object and otherwise only blanks.
 bool iwc_json_is_object(const char *text, size_t length);
 
 /// The same for a text of a trusted program: it does not search for equal names, and does not check the stored value
-/// again. Stores the value if it has changed.
+/// again. A text that differs from the stored one only in the digits and signs of integers is not checked again at all.
+/// Stores what has changed otherwise.
 bool iwc_json_is_trusted_object(const char *text, size_t length, iwc_stored_t *stored);
 
 /// Returns the value at a path of keys, "left.speed_mm_s", or the object itself for "". `iwc_json_is_object` must be true for the object. Compares

@@ -62,7 +62,7 @@ void iwl_bus_waited(iwl_backend_store_t *store, bool woken) {
 }
 
 iw_time_us_t iwl_bus_next_us(const iwl_backend_store_t *store) {
-    return seen(store)->look_us;
+    return seen(store)->poll_us;
 }
 
 const iwl_bus_link_t *iwl_bus_link(const iwl_backend_store_t *store) {
@@ -87,7 +87,7 @@ void iwl_bus_poll(iwl_backend_store_t *store, iw_time_us_t now_us) {
 void iwl_bus_lose(iwl_bus_t *bus, int error) {
     bus->up = false;
     bus->unhandled = IW_BUS_DOWN;
-    bus->look_us = bus->now_us;
+    bus->poll_us = bus->now_us;
     iwl_socketcan_socket_forget(&bus->ours);
     iwl_socketcan_socket_forget(&bus->others);
     bus->kind->lost(bus, error);
@@ -99,7 +99,7 @@ void iwl_bus_note(iwl_bus_t *bus, iw_bus_state_t state) {
     if (state < IW_BUS_PASSIVE) {
         bus->unhandled = state;
     }
-    bus->look_us = (state < IW_BUS_PASSIVE) ? bus->now_us + IWL_BUS_RETRY_US : IW_NEVER;
+    bus->poll_us = (state < IW_BUS_PASSIVE) ? bus->now_us + IWL_BUS_RETRY_US : IW_NEVER;
 }
 
 /// `forged`: a process of this machine sent it, which any user may do (fault 19). A forged bus-off still stops the
@@ -110,7 +110,7 @@ static void handle_error(iwl_bus_t *bus, iwl_can_error_t error, bool forged) {
         if (!forged) {
             bus->present = IW_BUS_OFF;
         }
-        bus->look_us = bus->now_us + (forged ? 0U : IWL_BUS_RETRY_US);
+        bus->poll_us = bus->now_us + (forged ? 0U : IWL_BUS_RETRY_US);
     } else if (forged) {
         return;
     } else if (error == IWL_CAN_ERROR_RESTARTED) {
@@ -144,7 +144,7 @@ void iwl_bus_fill(iwl_bus_t *bus) {
     }
     if (ours->lost != lost) {
         bus->link.lost = ours->lost;
-        bus->look_us = bus->now_us; // The batch may contain an error frame.
+        bus->poll_us = bus->now_us; // The batch may contain an error frame.
     }
 }
 

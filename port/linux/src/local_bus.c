@@ -16,7 +16,7 @@ IW_STATIC_ASSERT(sizeof(local_bus_t) <= sizeof(iwl_backend_store_t), local_bus_f
 /// Updates the state from the connection.
 static void follow(local_bus_t *local) {
     local->bus.up = iwl_unix_link_is_up(&local->hub);
-    local->bus.look_us = local->hub.retry_us;
+    local->bus.poll_us = local->hub.retry_us;
     local->bus.ours.fd = local->hub.fd;
 }
 

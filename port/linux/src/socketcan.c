@@ -105,7 +105,7 @@ static void drop_old(socketcan_t *can) {
 static void try_up(socketcan_t *can) {
     int interface = 0;
     iwl_bus_link_t link = can->bus.link;
-    can->bus.look_us = can->bus.now_us + IWL_BUS_RETRY_US;
+    can->bus.poll_us = can->bus.now_us + IWL_BUS_RETRY_US;
     link.presence = iwl_netdev_presence(can->probe_fd, can->name, &interface);
     if (link.presence != IWL_LINK_UP) {
         note_link(&can->bus, &link);
@@ -200,7 +200,7 @@ static void can_poll(iwl_bus_t *bus) {
     }
     if (!bus->up) {
         drop_old(can);
-        if (iwl_netlink_take_events(&can->events) || bus->now_us >= bus->look_us) {
+        if (iwl_netlink_take_events(&can->events) || bus->now_us >= bus->poll_us) {
             try_up(can);
         }
     }
@@ -211,7 +211,7 @@ static void can_poll(iwl_bus_t *bus) {
                 &can->events); // Not needed while up, but unread events would wake the loop again and again.
         }
     }
-    if (bus->up && bus->now_us >= bus->look_us) {
+    if (bus->up && bus->now_us >= bus->poll_us) {
         check_carrier(can);
     }
     (void)iwl_bus_load_take(&bus->load, bus->now_us, bus->link.bitrate_hz, &bus->link.load_permille);

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import functools
 import socket
 import time
 import warnings
@@ -19,16 +20,16 @@ from collections.abc import AsyncIterator, Generator, Mapping
 from ._connection import EVENTS_KEPT, ends_in_children
 from ._errors import GatewayUnavailable, IWheelError, LeaseEnded, NoAnswer, ProtocolError, Refused
 from ._protocol import Configured, Confirmed, Hello, OnRequest, Piece, RecordingEntry, State, Status, Stop, Tared, Watched
-from ._stop import stop_by_either
+from ._stop import STOP_AGAIN_S, in_own_thread, stop_apart
 from ._types import Applied, Event, OnStatus, Terms, Whole
 from ._wire import (
-    ALWAYS,
     ARM_AGAIN_S,
     ARM_S,
     HARMLESS,
     PASSING,
     REPEATABLE,
     REST_S,
+    STOPPED_MEANWHILE,
     Message,
     add_piece,
     Wire,
@@ -43,9 +44,10 @@ from ._wire import (
     lost_with,
     newest,
     period_of,
+    reason_of,
     result_of,
     seconds_of,
-    stands,
+    at_standstill,
     terms_of,
     without_envelope,
 )
@@ -66,7 +68,7 @@ class _Stream(asyncio.Protocol):
         """The gateway's greeting. Its `client` is the number of this connection, as in `lease.holder` of the status."""
         self.hello.add_done_callback(_retrieved)
         self.arms = 0
-        self.told = False
+        self.reported = False
         """The reader of events has received the end of the connection."""
         self.came = asyncio.Event()
         self.events: deque[Event] = deque()
@@ -115,6 +117,10 @@ class _Stream(asyncio.Protocol):
             self._fail(error)
         # Otherwise the loop runs in another thread, and reads the end of the connection there.
 
+    def is_here(self) -> bool:
+        """Returns True in the event loop of this connection."""
+        return _running_loop() is self._loop
+
     def leave(self) -> None:
         """Closes the socket in a forked child, without ending the parent's connection."""
         self.error = GatewayUnavailable(f"{self.path}: the connection belongs to the parent process")
@@ -124,8 +130,8 @@ class _Stream(asyncio.Protocol):
         """Sends the request immediately. The future returns the reply; if none comes in time, closes the connection and raises NoAnswer."""
         if not self.open or self._transport is None:
             raise self.error or GatewayUnavailable(f"{self.path}: the connection is closed")
-        if _running_loop() is not self._loop:
-            raise RuntimeError("this AsyncGateway belongs to another event loop; give each event loop its own")
+        if not self.is_here():
+            raise RuntimeError("this AsyncGateway belongs to another event loop; create one for each event loop")
         number, line = self._wire.request(cmd, fields)
         future: asyncio.Future[Message] = self._loop.create_future()
         self._waiting[number] = future
@@ -264,7 +270,7 @@ def _running_loop() -> asyncio.AbstractEventLoop | None:
 
 
 class AsyncGateway:
-    """Like `Gateway`. All tasks of one event loop may share it; each reader of events should have its own."""
+    """Like `Gateway`. All tasks of one event loop may share it; each reader of events should have its own. `stop` and `estop` work in every event loop."""
 
     def __init__(self, socket: str | None = None, *, timeout: float = 1.0, wait: float = 0.0) -> None:
         self._path = socket
@@ -273,6 +279,7 @@ class AsyncGateway:
         self._stream: _Stream | None = None
         self._subscription: Message | None = None
         self._connecting = asyncio.Lock()
+        self._stops = 0
         self._kept = False
 
     async def __aenter__(self) -> AsyncGateway:
@@ -330,10 +337,11 @@ class AsyncGateway:
             yield event
 
     async def stop(self) -> State:
+        self._stops += 1
         return cast(State, (await self._stop("stop"))["state"])
 
-    async def estop(self, reason: str | None = None) -> State:
-        return cast(State, (await self._stop("estop", reason=reason))["state"])
+    async def estop(self, reason: object = None) -> State:
+        return cast(State, (await self._stop("estop", reason=reason_of(reason)))["state"])
 
     async def reset(self) -> State:
         return cast(State, (await self._ask("reset"))["state"])
@@ -359,17 +367,16 @@ class AsyncGateway:
 
     # Private ---------------------------------------------------------------------------------------------------------
 
-    async def _connected(self, deadline: float | None, any_api: bool = False) -> _Stream:
+    async def _connected(self, deadline: float | None) -> _Stream:
         async with self._connecting:
             stream = self._stream
             if stream is None or not stream.open:
                 stream = await self._connect(deadline)
-            if not any_api:
-                try:
-                    check_api(stream.path, stream.hello.result())
-                except ProtocolError:
-                    stream.close()
-                    raise
+            try:
+                check_api(stream.path, stream.hello.result())
+            except ProtocolError:
+                stream.close()
+                raise
             return stream
 
     async def _connect(self, deadline: float | None) -> _Stream:
@@ -392,38 +399,49 @@ class AsyncGateway:
 
     async def _ask(self, cmd: str, **fields: Any) -> Message:
         deadline = time.monotonic() + self._wait if self._wait > 0 else None
-        stream = await self._connected(deadline, cmd in ALWAYS)
+        stream = await self._connected(deadline)
         try:
             return result_of(cmd, await stream.ask(cmd, fields, self._timeout))
         except GatewayUnavailable:
             if cmd not in REPEATABLE:
                 raise
-        return result_of(cmd, await (await self._connected(deadline, cmd in ALWAYS)).ask(cmd, fields, self._timeout))
+        return result_of(cmd, await (await self._connected(deadline)).ask(cmd, fields, self._timeout))
 
     async def _stop(self, cmd: str, **fields: Any) -> Message:
-        """Sends a stop through the open connection, or a separate one, which needs no place at the gateway and does not wait for the greeting."""
-        if self._stream is not None and self._stream.open:
+        """Sends a stop through the open connection. If there is none, or another event loop uses it, sends the stop through a separate connection, which
+        needs no place at the gateway and does not wait for the greeting. The first step sends it."""
+        deadline = time.monotonic() + self._wait
+        stream = self._stream
+        if stream is not None and stream.open and stream.is_here():
             try:
-                return result_of(cmd, await self._stream.ask(cmd, fields, self._timeout))
+                return result_of(cmd, await stream.ask(cmd, fields, self._timeout))
             except GatewayUnavailable:
                 pass
-        path = self._path or default_socket()
-        try:
-            return result_of(cmd, await asyncio.to_thread(stop_by_either, path, cmd, fields, self._timeout))
-        except GatewayUnavailable:
-            if self._wait <= 0:
-                raise
-        return await self._ask(cmd, **fields)  # The gateway may still start.
+        while True:
+            try:
+                sent = in_own_thread(functools.partial(stop_apart, self._known_path(), cmd, fields, self._timeout))
+                return result_of(cmd, await asyncio.wrap_future(sent))
+            except GatewayUnavailable:
+                if not time.monotonic() < deadline:
+                    raise
+            await asyncio.sleep(STOP_AGAIN_S)  # The gateway may still start.
+
+    def _known_path(self) -> str | None:
+        """Returns the socket of this AsyncGateway; None if no program named it and there is no connection."""
+        return self._path or (self._stream.path if self._stream is not None and self._stream.open else None)
 
     async def _arm(self, name: str | None, takeover: bool, wait: float) -> AsyncArmed:
-        until = time.monotonic() + wait
+        until, stops = time.monotonic() + wait, self._stops
         fields = {"name": name, "takeover": takeover or None}
         while True:
             stream = await self._connected(time.monotonic() + self._wait if self._wait > 0 else None)
             try:
-                return AsyncArmed(self, stream, terms_of(result_of("arm", await stream.ask("arm", fields, self._timeout))))
+                armed = AsyncArmed(self, stream, terms_of(result_of("arm", await stream.ask("arm", fields, self._timeout))))
+                if self._stops != stops:
+                    armed._end(STOPPED_MEANWHILE)
+                return armed
             except Refused as refusal:
-                if refusal.error not in PASSING or not time.monotonic() < until:
+                if refusal.error not in PASSING or self._stops != stops or not time.monotonic() < until:
                     raise
             except BaseException:  # Cancelled, dropped, no usable reply: only closing the connection surely ends a lease that began.
                 stream.close("arming was interrupted")
@@ -448,8 +466,8 @@ class AsyncGateway:
         return None
 
     async def _gone(self, stream: _Stream, deadline: float) -> Event | None:
-        if not stream.told:
-            stream.told = True
+        if not stream.reported:
+            stream.reported = True
             return {"event": "disconnected", "message": str(stream.error)}
         try:
             await self._connected(deadline)
@@ -458,9 +476,12 @@ class AsyncGateway:
         return {"event": "reconnected"}
 
     async def _wait_for_rest(self, seconds: float) -> bool:
+        if self._stream is not None and self._stream.open and not self._stream.is_here():
+            async with AsyncGateway(self._known_path(), timeout=self._timeout) as other:
+                return await other._wait_for_rest(seconds)
         deadline = time.monotonic() + seconds
         while True:
-            if stands(cast(Message, await self.status())):
+            if at_standstill(cast(Message, await self.status())):
                 return True
             if time.monotonic() > deadline:
                 return False
@@ -537,10 +558,7 @@ class AsyncArmed:
 
     async def stop(self, wait: float = REST_S) -> bool:
         self._end("it was stopped")
-        if self._stream.open:
-            await self._stream.ask("stop", {}, self._gateway._timeout)  # Its first step sends the line.
-        else:
-            await self._gateway.stop()
+        await self._gateway._stop("stop")
         return await self._gateway._wait_for_rest(wait)
 
     async def __aenter__(self) -> AsyncArmed:
@@ -548,7 +566,7 @@ class AsyncArmed:
 
     async def __aexit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         if kind is GeneratorExit:  # The program has dropped the task: no wait is possible any more.
-            self._end("its block was dropped")
+            self._end("its task was dropped")
             self._stream.close()
             return
         trouble = "one of them still turns"
@@ -558,7 +576,7 @@ class AsyncArmed:
         except IWheelError as problem:
             trouble = str(problem)
         finally:
-            self._end("its block was left")
+            self._end("its `async with` block ended")
             if not at_rest:
                 self._stream.close()
             if not self._gateway._kept:

@@ -38,7 +38,7 @@ class Connection:
         """Number of arms on this connection: only the last permission is valid."""
         self.events: deque[Event] = deque()
         self._latest = False
-        self.untold: str | None = None
+        self.unreported: str | None = None
         """Why the connection ended, if the reader of events has not received it yet."""
         self._lost = 0
         self._wire = Wire()
@@ -129,12 +129,12 @@ class Connection:
             while self.open and self._readable(0.0):
                 self._read()
         except GatewayUnavailable as error:
-            self.untold = str(error)
+            self.unreported = str(error)
         self._leave_out()
 
     def _leave_out(self) -> None:
-        kept, left_out = newest(self.events)
-        self.events, self._lost = deque(kept), self._lost + left_out
+        newest_events, left_out = newest(self.events)
+        self.events, self._lost = deque(newest_events), self._lost + left_out
 
     def _fail(self, error: GatewayUnavailable) -> GatewayUnavailable:
         self._error = self._error or error

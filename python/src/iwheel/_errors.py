@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The errors of this package. All are an IWheelError, and after none of them a wheel keeps turning."""
+"""The errors of this package. All derive from IWheelError. After each of them the wheels stop."""
 
 from __future__ import annotations
 

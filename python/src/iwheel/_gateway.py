@@ -17,16 +17,16 @@ from ._connection import Connection
 from ._errors import GatewayUnavailable, IWheelError, LeaseEnded, NoAnswer, ProtocolError, Refused
 from ._protocol import Configured, Confirmed, Hello, OnRequest, Piece, RecordingEntry, State, Status, Stop, Tared, Watched
 from ._record import record
-from ._stop import stop_by_either
+from ._stop import STOP_AGAIN_S, stop_apart
 from ._types import Applied, Event, OnStatus, Terms, Whole
 from ._wire import (
-    ALWAYS,
     ARM_AGAIN_S,
     ARM_S,
     HARMLESS,
     PASSING,
     REPEATABLE,
     REST_S,
+    STOPPED_MEANWHILE,
     Message,
     add_piece,
     applied_of,
@@ -37,9 +37,10 @@ from ._wire import (
     integers,
     lost_with,
     period_of,
+    reason_of,
     result_of,
     seconds_of,
-    stands,
+    at_standstill,
     terms_of,
     without_envelope,
 )
@@ -48,10 +49,12 @@ from ._wire import (
 class Gateway:
     """A connection to the gateway. It connects with the first request, and again after the connection broke. It never resumes driving.
 
-    `socket`: path of the socket; by default $IWHEEL_SOCKET, or the only gateway in /run/iwheel. `timeout`: longest wait for each reply, in seconds.
+    `socket`: path of the socket; by default $IWHEEL_SOCKET, or the only gateway in /run/iwheel. If several run there, a Gateway without a connection
+    sends `stop` and `estop` to all of them. `timeout`: longest wait for each reply, in seconds.
     `wait`: longest wait for a gateway that is not running (yet), in seconds.
 
-    One thread at a time: create a Gateway for each thread. `with` closes the connection at its end.
+    One thread at a time: create a Gateway for each thread. `stop`, `estop` and `close` work from every thread at any time. `with` closes the connection
+    at its end.
     """
 
     def __init__(self, socket: str | None = None, *, timeout: float = 1.0, wait: float = 0.0) -> None:
@@ -61,6 +64,10 @@ class Gateway:
         self._connection: Connection | None = None
         self._subscription: Message | None = None
         self._busy = threading.RLock()
+        self._user = 0
+        """The last thread that sent a request. A stop by another thread must not disturb its requests."""
+        self._stops = 0
+        """Number of calls of `stop`. An `arm` that began before the last one grants nothing."""
         self._kept = False
 
     def __enter__(self) -> Gateway:
@@ -143,11 +150,15 @@ class Gateway:
 
     def stop(self) -> State:
         """Stops the wheels with the ramp, whichever client drives. Returns the state after that."""
+        self._stops += 1
         return cast(State, self._stop("stop")["state"])
 
-    def estop(self, reason: str | None = None) -> State:
-        """Stops the wheels without a ramp, latched until `reset`. It does not replace the button that cuts power."""
-        return cast(State, self._stop("estop", reason=reason)["state"])
+    def estop(self, reason: object = None) -> State:
+        """Stops the wheels without a ramp, latched until `reset`. It does not replace the button that cuts power.
+
+        `reason` appears in `why`, as one line of at most 200 bytes. It can be any object, for example an exception: this method uses its text.
+        """
+        return cast(State, self._stop("estop", reason=reason_of(reason))["state"])
 
     # Requests that need a decision -----------------------------------------------------------------------------------
 
@@ -189,48 +200,53 @@ class Gateway:
 
         Other clients can read `name`. `takeover` transfers the lease from another client, with the wheels at standstill. `wait`: seconds for which
         the call repeats the request after a recent stop: while the wheels do not count as at standstill (`not_at_rest`), or a drive command is less
-        than half a second old (`stale_command`). It raises every other refusal immediately.
+        than half a second old (`stale_command`). It raises every other refusal immediately. A `stop` of this Gateway in the meantime, by another
+        thread, ends the wait and the permission. `arm` does not notice the `stop` of another client: after LeaseEnded let a person decide before the
+        next `arm`. Only `estop` keeps all clients from driving, until `reset`.
         """
-        deadline = time.monotonic() + wait
+        deadline, stops = time.monotonic() + wait, self._stops
         while True:
             try:
                 reply = self._ask("arm", name=name, takeover=takeover or None)
                 break
             except Refused as refusal:
-                if refusal.error not in PASSING or not time.monotonic() < deadline:
+                if refusal.error not in PASSING or self._stops != stops or not time.monotonic() < deadline:
                     raise
             time.sleep(ARM_AGAIN_S)
         connection = self._connection
         if connection is None:
             raise GatewayUnavailable("the connection was closed while arming")
         try:
-            return Armed(self, connection, terms_of(reply))
+            armed = Armed(self, connection, terms_of(reply))
         except ProtocolError:
             connection.close()
             raise
+        if self._stops != stops:
+            armed._end(STOPPED_MEANWHILE)
+        return armed
 
     # Private ---------------------------------------------------------------------------------------------------------
 
     @contextmanager
     def _alone(self) -> Iterator[None]:
         if not self._busy.acquire(blocking=False):
-            raise RuntimeError("this Gateway is in use by another thread; give each thread its own")
+            raise RuntimeError("this Gateway is in use by another thread; create one for each thread")
+        self._user = threading.get_ident()
         try:
             yield
         finally:
             self._busy.release()
 
-    def _connected(self, deadline: float | None, any_api: bool = False) -> Connection:
+    def _connected(self, deadline: float | None) -> Connection:
         """Returns the connection, a new one if the last one broke. Tries until the deadline (None: once)."""
         connection = self._connection
         if connection is None or not connection.alive():
             connection = self._connect(deadline)
-        if not any_api:
-            try:
-                check_api(connection.path, connection.hello or {})
-            except ProtocolError:
-                connection.close()
-                raise
+        try:
+            check_api(connection.path, connection.hello or {})
+        except ProtocolError:
+            connection.close()
+            raise
         return connection
 
     def _connect(self, deadline: float | None) -> Connection:
@@ -254,28 +270,39 @@ class Gateway:
     def _ask(self, cmd: str, **fields: Any) -> Message:
         with self._alone():
             deadline = time.monotonic() + self._wait if self._wait > 0 else None
-            connection = self._connected(deadline, cmd in ALWAYS)
+            connection = self._connected(deadline)
             try:
                 return result_of(cmd, connection.ask(cmd, fields, self._timeout))
             except GatewayUnavailable:
                 if cmd not in REPEATABLE:
                     raise
-            return result_of(cmd, self._connected(deadline, cmd in ALWAYS).ask(cmd, fields, self._timeout))
+            return result_of(cmd, self._connected(deadline).ask(cmd, fields, self._timeout))
 
     def _stop(self, cmd: str, **fields: Any) -> Message:
-        """Sends a stop through the open connection, or a separate one, which needs no place at the gateway and does not wait for the greeting."""
-        with self._alone():
-            if self._connection is not None and self._connection.alive():
-                try:
-                    return result_of(cmd, self._connection.ask(cmd, fields, self._timeout))
-                except GatewayUnavailable:
-                    pass
+        """Sends a stop through the open connection. If there is none, or another thread uses it, sends the stop through a separate connection, which
+        needs no place at the gateway and does not wait for the greeting."""
+        deadline = time.monotonic() + self._wait
+        connection = self._connection
+        if connection is not None and self._user == threading.get_ident() and self._busy.acquire(blocking=False):
             try:
-                return result_of(cmd, stop_by_either(self._path or default_socket(), cmd, fields, self._timeout))
+                if connection.alive():
+                    return result_of(cmd, connection.ask(cmd, fields, self._timeout))
             except GatewayUnavailable:
-                if self._wait <= 0:
+                pass
+            finally:
+                self._busy.release()
+        while True:
+            try:
+                return result_of(cmd, stop_apart(self._known_path(), cmd, fields, self._timeout))
+            except GatewayUnavailable:
+                if not time.monotonic() < deadline:
                     raise
-        return self._ask(cmd, **fields)  # The gateway may still start.
+            time.sleep(STOP_AGAIN_S)  # The gateway may still start.
+
+    def _known_path(self) -> str | None:
+        """Returns the socket of this Gateway; None if no program named it and there is no connection."""
+        connection = self._connection
+        return self._path or (connection.path if connection is not None and connection.open else None)
 
     def _ask_on(self, connection: Connection, cmd: str, fields: Message) -> Message:
         """Sends a request on this connection only. Reads all that has come first, because the connection may have ended."""
@@ -301,7 +328,7 @@ class Gateway:
                     connection.wait(deadline)
                 except GatewayUnavailable as error:
                     if not connection.events:
-                        connection.untold = None
+                        connection.unreported = None
                         return {"event": "disconnected", "message": str(error)}
 
     def _back_again(self, deadline: float) -> Event | None:
@@ -309,9 +336,9 @@ class Gateway:
         left = self._connection.take_event()
         if left is not None:
             return left
-        untold, self._connection.untold = self._connection.untold, None
-        if untold is not None:
-            return {"event": "disconnected", "message": untold}
+        unreported, self._connection.unreported = self._connection.unreported, None
+        if unreported is not None:
+            return {"event": "disconnected", "message": unreported}
         try:
             self._connected(deadline)
         except GatewayUnavailable:
@@ -321,7 +348,12 @@ class Gateway:
     def _wait_for_rest(self, seconds: float) -> bool:
         deadline = time.monotonic() + seconds
         while True:
-            if stands(cast(Message, self.status())):
+            try:
+                status = self.status()
+            except RuntimeError:  # Another thread uses this Gateway.
+                with Gateway(self._known_path(), timeout=self._timeout) as other:
+                    return other._wait_for_rest(deadline - time.monotonic())
+            if at_standstill(cast(Message, status)):
                 return True
             if time.monotonic() > deadline:
                 return False
@@ -385,7 +417,7 @@ class Armed:
     def stop(self, wait: float = REST_S) -> bool:
         """Ramps to zero and waits at most `wait` seconds for standstill of both wheels. Returns True if they reached it. Ends the permission."""
         self._end("it was stopped")
-        self._gateway.stop()
+        self._gateway._stop("stop")
         return self._gateway._wait_for_rest(wait)
 
     def __enter__(self) -> Armed:
@@ -399,7 +431,7 @@ class Armed:
         except (IWheelError, RuntimeError) as problem:
             trouble = str(problem)
         finally:
-            self._end("its block was left")
+            self._end("its `with` block ended")
             if not at_rest:
                 self._connection.close()
             if not self._gateway._kept:
@@ -449,10 +481,10 @@ class Armed:
     def _leave(self) -> bool:
         """Stops the wheels, unless another client drives now."""
         surely_ours = self._ended is None and time.monotonic() - self._fed < self.terms.lease_ms / 1000
-        if not surely_ours and self._somebody_else_drives():
+        if not surely_ours and self._another_client_drives():
             return True
         return self.stop()
 
-    def _somebody_else_drives(self) -> bool:
+    def _another_client_drives(self) -> bool:
         holder = self._gateway.status()["lease"]["holder"]
         return holder is not None and holder != (self._connection.hello or {}).get("client")

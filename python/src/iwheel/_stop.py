@@ -3,18 +3,23 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import socket
+import threading
 import time
 from typing import Any
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future
 
 from ._errors import GatewayUnavailable, NoAnswer
-from ._wire import WATCH_FOLDER, Message, Wire, cannot_connect
+from ._wire import WATCH_FOLDER, Message, Wire, cannot_connect, default_sockets
 
 ATTEMPT_S = 0.3
 """Longest time of one attempt."""
 AGAIN_S = 0.005
+STOP_AGAIN_S = 0.05
+"""Time between two attempts while a client waits for a gateway that is not running yet."""
 
 
 def other_socket(path: str) -> str:
@@ -22,6 +27,52 @@ def other_socket(path: str) -> str:
     folder, name = os.path.split(path)
     above, last = os.path.split(folder)
     return os.path.join(above, name) if last == WATCH_FOLDER else os.path.join(folder, WATCH_FOLDER, name)
+
+
+def in_own_thread(call: Callable[[], Message]) -> Future[Message]:
+    """Calls in a thread of its own, because the threads of an executor may all be occupied; in this thread if no other can start. Nothing cancels it."""
+    future: Future[Message] = Future()
+    future.set_running_or_notify_cancel()
+
+    def run() -> None:
+        try:
+            future.set_result(call())
+        except BaseException as error:  # noqa: BLE001 (the caller receives it)
+            future.set_exception(error)
+
+    try:
+        threading.Thread(target=run, name="iwheel stop").start()
+    except RuntimeError:
+        run()
+    return future
+
+
+def stop_apart(path: str | None, cmd: str, fields: Mapping[str, Any], timeout: float) -> Message:
+    """Sends a stop through connections of its own: to that socket, or to all default ones. Returns the reply of a gateway that executed it.
+
+    Sends the line to all of them before it waits for the first reply, so a hung gateway delays no other.
+    """
+    paths = [path] if path else default_sockets()
+    replies: list[Message] = []
+    errors: list[GatewayUnavailable] = []
+    with contextlib.ExitStack() as early:
+        for one in paths if len(paths) > 1 else []:
+            with contextlib.suppress(OSError):
+                _post(early.enter_context(socket.socket(socket.AF_UNIX)), one, cmd, fields)
+        for one in paths:
+            try:
+                replies.append(stop_by_either(one, cmd, fields, timeout))
+            except GatewayUnavailable as error:
+                errors.append(error)
+    if not replies:
+        raise errors[0]
+    return next((reply for reply in replies if reply["ok"] is True), replies[0])
+
+
+def _post(one: socket.socket, path: str, cmd: str, fields: Mapping[str, Any]) -> None:
+    one.setblocking(False)
+    one.connect(path)
+    one.sendall(Wire().request(cmd, fields)[1])
 
 
 def stop_by_either(path: str, cmd: str, fields: Mapping[str, Any], timeout: float) -> Message:

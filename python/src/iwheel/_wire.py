@@ -5,11 +5,13 @@ from __future__ import annotations
 
 import base64
 import binascii
+import errno
 import json
 import math
 import numbers
 import operator
 import os
+import socket
 import zlib
 from typing import Any, cast
 from collections.abc import Iterable, Mapping
@@ -26,16 +28,17 @@ HARMLESS = ("out_of_range", "bad_value", "missing_field", "unknown_field", "bad_
 """Refusals of a drive command that do not end the permission to drive."""
 PASSING = ("not_at_rest", "stale_command")
 """Refusals of `arm` that end on their own: when the wheels are at standstill, or the last drive command is half a second old."""
-REPEATABLE = ("hello", "status", "why", "recordings", "recording", "stop", "estop")
+REPEATABLE = ("hello", "status", "why", "recordings", "recording")
 """Requests that are repeated on a new connection if the old one broke. They never start a motion."""
-ALWAYS = ("stop", "estop")
-"""Requests that are sent even to a gateway with a newer protocol."""
 REST_S = 3.0
 """Longest wait for standstill at the end of driving."""
 ARM_S = 2.0
 """Time for which `arm` repeats its request after a recent stop."""
 ARM_AGAIN_S = 0.05
+STOPPED_MEANWHILE = "the wheels were stopped while it was requested"
 RATE_MAX_HZ = 100
+REASON_BYTES = 200
+"""Longest `reason` of an estop."""
 DISTINCTIONS = {"fault": ("cause",), "offset": ("side",), "ledger": ("item",), "frame": ("id", "kind")}
 """Fields that must be equal for one event to supersede another of the same name."""
 
@@ -44,19 +47,34 @@ NoneType = type(None)
 
 
 def default_socket() -> str:
-    """Returns $IWHEEL_SOCKET, or the socket of the only gateway in /run/iwheel: its drive socket, or the watch socket if only that may be used.
+    """Returns $IWHEEL_SOCKET, or the socket of the only gateway in /run/iwheel. Sockets that a killed gateway has left do not count.
 
     Raises GatewayUnavailable with the fix if several gateways run."""
+    sockets = default_sockets()
+    if len(sockets) > 1:
+        sockets = [path for path in sockets if not is_left_over(path)] or sockets[:1]
+    if len(sockets) > 1:
+        names = ", ".join(map(os.path.basename, sockets))
+        raise GatewayUnavailable(f"several gateways run: {names} in {DEFAULT_FOLDER}; name the socket of one")
+    return sockets[0]
+
+
+def default_sockets() -> list[str]:
+    """Returns $IWHEEL_SOCKET, or of each gateway in /run/iwheel the drive socket, or the watch socket if only that may be used. Never empty."""
     named = os.environ.get("IWHEEL_SOCKET")
     if named:
-        return named
+        return [named]
     watch_folder = os.path.join(DEFAULT_FOLDER, WATCH_FOLDER)
-    names = sorted(sockets_in(DEFAULT_FOLDER) | sockets_in(watch_folder))
-    if len(names) > 1:
-        raise GatewayUnavailable(f"several gateways run: {', '.join(names)} in {DEFAULT_FOLDER}; name the socket of one")
-    name = names[0] if names else "gateway.sock"
-    drive, watch = os.path.join(DEFAULT_FOLDER, name), os.path.join(watch_folder, name)
-    return watch if may_use(watch) and not may_use(drive) else drive
+    names = sorted(sockets_in(DEFAULT_FOLDER) | sockets_in(watch_folder)) or ["gateway.sock"]
+    both = [(os.path.join(DEFAULT_FOLDER, name), os.path.join(watch_folder, name)) for name in names]
+    return [watch if may_use(watch) and not may_use(drive) else drive for drive, watch in both]
+
+
+def is_left_over(path: str) -> bool:
+    """Returns True if no program listens at that socket any more."""
+    with socket.socket(socket.AF_UNIX) as one:
+        one.setblocking(False)
+        return one.connect_ex(path) == errno.ECONNREFUSED
 
 
 def sockets_in(folder: str) -> set[str]:
@@ -167,6 +185,16 @@ def period_of(terms: Terms, rate_hz: float | None) -> float:
     return min(terms.lease_ms / 3000, 1 / rate_hz if rate_hz is not None else math.inf)
 
 
+def reason_of(reason: object) -> str | None:
+    """Returns the reason of an estop as a text that the gateway accepts: no reason may prevent the stop."""
+    try:
+        text = "" if reason is None else str(reason)[: 10 * REASON_BYTES]
+    except Exception as error:  # noqa: BLE001 (it is the program's own code)
+        text = f"{type(reason).__name__} (its text failed: {type(error).__name__})"
+    words = "".join(character if character.isprintable() else " " for character in text).split()
+    return " ".join(words).encode()[:REASON_BYTES].decode(errors="ignore").rstrip() or None
+
+
 def ended_by(refusal: Refused) -> LeaseEnded:
     return LeaseEnded(f"this permission to drive is over: {refusal.message}", refusal.error)
 
@@ -245,7 +273,7 @@ def newest(events: Iterable[Event]) -> tuple[list[Event], int]:
     return list(retained.values()), left_out
 
 
-def stands(status: Message) -> bool:
+def at_standstill(status: Message) -> bool:
     """Returns True if no speed is commanded and both wheels are known to be at standstill."""
     wheels = [cast(Message, status[side]) for side in ("left", "right")]
     return all(wheel["at_rest"] is True and not wheel["applied_mm_s"] for wheel in wheels)

@@ -31,7 +31,7 @@ void tearDown(void) {
 
 static size_t write_event(gw_daemon_t *daemon, const char **out_line) {
     iwn_out_t json = iwn_server_begin_event(&daemon->answers.server, "state");
-    iwn_server_write_status(&daemon->answers.server, iwn_server_look(&daemon->answers.server), &json);
+    iwn_server_write_status(&daemon->answers.server, iwn_server_snapshot(&daemon->answers.server), &json);
     iwn_out_close(&json, '}');
     *out_line = json.data;
     return iwn_out_finish(&json);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 /// A gateway that drives two obedient wheels, for a counter of instructions: `bench_prepare` brings it to a steady drive, then
-/// `bench_idle` is one step with nothing due, `bench_pair` one in which a pair is due (of a ramp after `bench_faster`), `bench_frame_in` one that receives a speed; `bench_look` takes a snapshot.
+/// `bench_idle` is one step with nothing due, `bench_pair` one in which a pair is due (of a ramp after `bench_faster`), `bench_frame_in` one that receives a speed; `bench_snapshot` takes a snapshot.
 #include "iwheel/gateway.h"
 
 #define CLIENT 7U
@@ -129,7 +129,7 @@ int bench_frame_in(void) {
 static iw_snapshot_t seen;
 
 /// Reads one snapshot.
-void bench_look(void) {
+void bench_snapshot(void) {
     iw_gateway_snapshot(&gateway, gateway.promised_us, &seen);
 }
 

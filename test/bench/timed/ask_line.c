@@ -26,7 +26,7 @@ static void send_line(int client, const char *words) {
 }
 
 /// Returns false if the wheels still turn after an earlier measurement.
-static bool hear_ok(int client) {
+static bool receive_ok(int client) {
     static char answer[65536];
     size_t length = 0;
     struct pollfd ready = {.fd = client, .events = POLLIN};
@@ -50,7 +50,7 @@ static bool hear_ok(int client) {
 static void ask_until_ok(int client, const char *words) {
     for (int waited_ms = 0; waited_ms < REPLY_ms; waited_ms += REST_ms) {
         send_line(client, words);
-        if (hear_ok(client)) {
+        if (receive_ok(client)) {
             return;
         }
         timed_sleep_until_ns(timed_now_ns(CLOCK_MONOTONIC) + REST_ms * INT64_C(1000000));

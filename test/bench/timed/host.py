@@ -19,7 +19,7 @@ CODEC = HERE.parent / "codec"
 INCLUDES = [f"-I{CODEC}", f"-I{ROOT / 'core/include'}"]
 MORE = {"floor_receive": [CODEC / "floor.c"], "flood": [CODEC / "mix.c"]}
 PACKAGES = {"candump": "can-utils", "gpiomon": "gpiod", "strace": "strace"}
-ALL = ("calls", "period_idle", "period_loaded", "flood", "flood_loaded", "line", "told", "estop")
+ALL = ("calls", "period_idle", "period_loaded", "flood", "flood_loaded", "line", "reported", "estop")
 COUNTED = ("calls",)  # in virtual time: each frame comes at its own moment, however long it takes to trace the calls
 FULL = {"rounds": 3, "period_s": 4.0, "flood_s": 3.0, "calls_s": 3.0, "count": 150, "presses": 12}
 SHORT = {"rounds": 1, "period_s": 0.6, "flood_s": 0.3, "calls_s": 0.5, "count": 10, "presses": 1, "stall_us": 1_000_000}
@@ -231,7 +231,7 @@ def call_rows(measured):
 def latency_rows(measured):
     wanted = (
         ("line", "client's line to frame on the bus", (("p50", "≤ 2.0 ×"), ("p90", "≤ 1.4 ×"))),
-        ("told", "frame on the bus to client's line", (("p50", "≤ 1.3 ×"),)),
+        ("reported", "frame on the bus to client's line", (("p50", "≤ 1.3 ×"),)),
         ("estop", "press of the e-stop to both zeros", (("p50", "≤ 1.3 ×"), ("p90", "≤ 1.8 ×"))),
     )
     for name, words, parts in wanted:

@@ -519,6 +519,6 @@ MEASURES = {
     "pair": Pair,
     "calls": Calls,
     "line": Line,
-    "told": Reported,
+    "reported": Reported,
     "estop": Estop,
 }

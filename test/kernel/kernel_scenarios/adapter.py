@@ -41,20 +41,20 @@ def restart(rig):
     netdev.up(rig.adapter.interface)
 
 
-def tell(state):
-    return lambda rig: rig.adapter.tell(state)
+def report(state):
+    return lambda rig: rig.adapter.report(state)
 
 
 def burst(rig, number):
     rig.adapter.errors(5, b"sc")
-    rig.adapter.tell("passive" if number % 2 else "warning")
+    rig.adapter.report("passive" if number % 2 else "warning")
 
 
 ADAPTER_STATES = (
-    (bus_states.row16_bus_off, lambda t: bus_states.bus_off(t, tell("bus_off"), restart)),
-    (bus_states.row16_bus_off_listening, lambda t: bus_states.bus_off_listening(t, tell("bus_off"), restart)),
-    (bus_states.row16_error_passive, lambda t: bus_states.error_passive(t, tell("passive"), tell("active"))),
-    (bus_states.row16_error_flood, lambda t: bus_states.error_flood(t, burst, tell("active"))),
+    (bus_states.row16_bus_off, lambda t: bus_states.bus_off(t, report("bus_off"), restart)),
+    (bus_states.row16_bus_off_listening, lambda t: bus_states.bus_off_listening(t, report("bus_off"), restart)),
+    (bus_states.row16_error_passive, lambda t: bus_states.error_passive(t, report("passive"), report("active"))),
+    (bus_states.row16_error_flood, lambda t: bus_states.error_flood(t, burst, report("active"))),
 )
 for there, here in ADAPTER_STATES:  # the adapter does what the simulator does on the local bus
     add(there.__name__, REGISTRY[there.__name__][0], here, groups="adapter", row=16, rig=SlcanRig)
@@ -148,8 +148,8 @@ def power_cut(t, seconds, setup):
     back_us = now_us()
     rig.sim.ask("power on")
     rig.note("alive")
-    heard = rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"], 10)
-    t.check(heard, "the wheels are online again")
+    online = rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"], 10)
+    t.check(online, "the wheels are online again")
     time.sleep(0.5)
     late = rig.bus.setpoints(back_us)
     moving = [(at, side) for at, side, speed in late if speed]

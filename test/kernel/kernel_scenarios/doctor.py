@@ -24,10 +24,10 @@ def doctor(rig, *words, meanwhile=None):
     return process.returncode, checks
 
 
-def expect(t, checks, check, verdict, text, cure=""):
+def expect(t, checks, check, verdict, text, fix=""):
     finding = checks.get(check, {"verdict": "missing", "text": "", "cure": ""})
-    good = finding["verdict"] == verdict and text in finding["text"] and cure in (finding["cure"] or "")
-    t.check(good, f"{check}: {verdict}, {text!r}, {cure!r} expected, found {finding}")
+    good = finding["verdict"] == verdict and text in finding["text"] and fix in (finding["cure"] or "")
+    t.check(good, f"{check}: {verdict}, {text!r}, {fix!r} expected, found {finding}")
 
 
 @kernel_test("doctor without a gateway: interface, e-stop line, the command that fixes it", "bus", 0)

@@ -51,7 +51,7 @@ def series(t, count, chance):
         t.rigs.remove(rig)
 
 
-def told(t):
+def report_figures(t):
     """The figures of all series together."""
     t.figures.clear()
     t.figure(f"longest gap {t.measures['gap_ms']:.0f} ms")
@@ -69,7 +69,7 @@ def presses(t, count, seed):
             return
     if t.late_machine > 0.1 * count:
         raise Skip(f"the machine was late during {t.late_machine} of {count} presses; needs a quieter one")
-    told(t)
+    report_figures(t)
     if t.late_machine:
         t.figure(f"{t.late_machine} presses do not count: the machine was late")
     t.check(t.met >= 0.9 * count, f"{t.met} of {count} presses met a running setpoint")
@@ -150,10 +150,10 @@ def row12_glitch(t):
     t.judge(rig)
 
 
-def told_at(t, rig, client, state, at):
+def expect_at(t, rig, client, state, at):
     """The e-stop is in that state, by those contacts."""
-    told = rig.wait_status(client, lambda s: (s["estop"]["state"], s["estop"]["pressed_at"]) == (state, at), 2)
-    t.check(told, f"{state} at {at} expected, it is {client.request('status')['estop']}")
+    reached = rig.wait_status(client, lambda s: (s["estop"]["state"], s["estop"]["pressed_at"]) == (state, at), 2)
+    t.check(reached, f"{state} at {at} expected, it is {client.request('status')['estop']}")
 
 
 @kernel_test("two contacts on two lines: either stops, both must release, and both prove the button", "estop", 11, TwoContactsRig)
@@ -166,7 +166,7 @@ def row11_two_lines(t):
             time.sleep(0.4)
             (rig.press if first else lambda: rig.second(True))()
             time.sleep(0.05)
-            told_at(t, rig, client, "pressed", "line" if first else "line2")
+            expect_at(t, rig, client, "pressed", "line" if first else "line2")
             stream.stop()
             t.stopped_by(client, "estop_line")
             t.expect(client.request("reset"), "estop_pressed")
@@ -174,7 +174,7 @@ def row11_two_lines(t):
                 rig.second(True)
                 rig.chip.pull(False)
                 time.sleep(0.1)
-                told_at(t, rig, client, "pressed", "both")
+                expect_at(t, rig, client, "pressed", "both")
             rig.release()
             rig.second(False)
             reset(t, client, 6.0)
@@ -193,7 +193,7 @@ def row13_line_shorted(t):
     time.sleep(0.05)
     stream.stop()
     t.stopped_by(client, "estop_line")
-    told_at(t, rig, client, "disagrees", "line")
+    expect_at(t, rig, client, "disagrees", "line")
     t.check("estop_disagrees" in client.request("status")["present"], "the cause is present")
     rig.release()
     for _ in range(3):
@@ -208,10 +208,10 @@ def row13_line_shorted(t):
     rig.chip.pull(False)
     rig.second(True)
     time.sleep(0.1)
-    told_at(t, rig, client, "disagrees", "both")
+    expect_at(t, rig, client, "disagrees", "both")
     rig.release()
     rig.second(False)
-    told_at(t, rig, client, "released", "neither")
+    expect_at(t, rig, client, "released", "neither")
     reset(t, client, 6.0)
     t.arm(client)
     t.drive_for(client, 200, 200, 0.5)
@@ -257,8 +257,8 @@ def row13_pressed_at_start(t):
     rig.chip.pull(rig.active == "high")
     rig.start_gateway(wheels=False)
     client = rig.client()
-    heard = rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"], 3)
-    t.check(heard and heard["state"] == "latched", f"latched from the start: {heard and heard['state']}")
+    online = rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"], 3)
+    t.check(online and online["state"] == "latched", f"latched from the start: {online and online['state']}")
     t.stopped_by(client, "estop_line")
     for _ in range(5):
         t.expect(client.request("reset"), "estop_pressed")

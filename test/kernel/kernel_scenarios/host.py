@@ -157,7 +157,7 @@ def row30_gives_way(t):
     rig.start_gateway()
     t.check(f"process {theirs.child.pid} of user 65534 holds" in rig.gateway.text(), f"named: {rig.gateway.text()[-400:]}")
     t.check(theirs.wait(5) == 69, "it ends")
-    t.check("goes before this one" in theirs.text(), f"and prints the reason: {theirs.text()[-300:]}")
+    t.check("has priority over this one" in theirs.text(), f"and prints the reason: {theirs.text()[-300:]}")
     again = Process(command, rig.path("again.out"), become_stranger)
     rig.processes.append(again)
     t.check(again.wait(5) == 69 and "another gateway already serves" in again.text(), f"nor starts: {again.text()[-300:]}")

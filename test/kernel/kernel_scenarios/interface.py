@@ -23,8 +23,8 @@ STALE_US = 20_000  # frames later than this after the return of a bus were not i
 
 def back_to_driving(t, rig, client):
     """Both wheels are online, reset is accepted, nothing moved without a command, and it drives again."""
-    heard = rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"] and s["bus"]["state"] == "active", 8)
-    if not t.check(heard, f"online again: {client.request('status')['bus']}"):
+    online = rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"] and s["bus"]["state"] == "active", 8)
+    if not t.check(online, f"online again: {client.request('status')['bus']}"):
         return
     wait_reset(t, client)
     t.arm(client)
@@ -162,8 +162,8 @@ def row15_down_while_listening(t):
     states = [event["state"] for event in client.collect(0.1) if event["event"] == "bus"]
     t.check("down" in states, f"the event comes: {states}")
     netdev.up(rig.interface)
-    heard = rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"] and s["bus"]["state"] == "active")
-    t.check(heard, "back without reset")
+    online = rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"] and s["bus"]["state"] == "active")
+    t.check(online, "back without reset")
     t.rule(not rig.bus.setpoints(), "nothing was sent")
     time.sleep(1.1)
     t.arm(client)
@@ -272,8 +272,8 @@ def row17_echo_too_late_at_arm(t):
 
 def back_to_driving_if_latched(t, rig, client):
     time.sleep(1.2)
-    heard = rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"], 5)
-    t.check(heard, "the wheels are online")
+    online = rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"], 5)
+    t.check(online, "the wheels are online")
     wait_reset(t, client)
     t.arm(client)
     t.drive_for(client, 200, 200, 0.5)
@@ -313,15 +313,15 @@ def row17_echo_missing(t):
 def restart_as_the_unit_does(t, interface):
     """What systemd would do for iwheel-can-restart@.path: once the file has been written, the commands of the service."""
     with open(os.path.join(UNITS, "iwheel-can-restart@.path"), encoding="utf-8") as unit:
-        wish = re.search(r"(?m)^PathChanged=(.*)$", unit.read())[1].replace("%i", interface)
-    if not t.check(os.path.exists(wish), f"the gateway asks with {wish}"):
+        watched = re.search(r"(?m)^PathChanged=(.*)$", unit.read())[1].replace("%i", interface)
+    if not t.check(os.path.exists(watched), f"the gateway asks with {watched}"):
         return
     with open(os.path.join(UNITS, "iwheel-can-restart@.service"), encoding="utf-8") as unit:
         for command in re.findall(r"(?m)^ExecStart=(.*)$", unit.read()):
             netdev.command(*command.replace("%i", interface).split())
 
 
-def told_by_the_tool(t, rig):
+def reported_by_the_tool(t, rig):
     """The texts of `iwheelctl why` and `doctor` about it."""
 
     def ask(*words):
@@ -336,13 +336,13 @@ def told_by_the_tool(t, rig):
 
 def restart_as_doctor_says(t, rig):
     """The commands in its fix."""
-    commands = re.search(r"ip link set \S+ down; ip link set \S+ up", told_by_the_tool(t, rig)["doctor"])
+    commands = re.search(r"ip link set \S+ down; ip link set \S+ up", reported_by_the_tool(t, rig)["doctor"])
     if t.check(commands is not None, "doctor names the commands"):
         for command in commands[0].split("; "):
             netdev.command(*command.split())
 
 
-def lost_echo(t, cure):
+def lost_echo(t, repair):
     """An echo gets lost while driving, and the gateway may not restart the link: reported, and fixed without a restart of the gateway."""
     rig = t.rig(LATE)
     needs_echo(rig)
@@ -365,13 +365,13 @@ def lost_echo(t, cure):
     said = " ".join(client.request("status")["warnings"])
     for sentence in (refused, said):
         t.check(f"ip link set {rig.interface} down; ip link set {rig.interface} up" in sentence, f"the fix is named: {sentence}")
-    for what, text in {"a warning": said, **told_by_the_tool(t, rig)}.items():
+    for what, text in {"a warning": said, **reported_by_the_tool(t, rig)}.items():
         t.check(f"ip link set {rig.interface} down; ip link set {rig.interface} up" in text, f"{what} names the fix: {text}")
         t.check(f"systemctl enable --now iwheel-can-restart@{rig.interface}.path" in text, f"{what} names the unit: {text}")
     reported = [e["present"] for e in observer.collect(0.1) if e["event"] == "fault" and e["cause"] == "setpoint_left"]
     t.check(reported == [True], f"the event comes: {reported}")
     silent_us = now_us()
-    cure(rig)
+    repair(rig)
     back_to_driving_if_latched(t, rig, client)
     reported = [e["present"] for e in observer.collect(0.1) if e["event"] == "fault" and e["cause"] == "setpoint_left"]
     t.check(reported == [True, False], f"and ends: {reported}")

@@ -134,7 +134,7 @@ def plumbing_late_interface(t):
     netdev.delete("vcan9")
 
 
-def hear_errors(interface):
+def receive_errors(interface):
     sock = open_raw(interface)
     sock.setsockopt(socket.SOL_CAN_RAW, CAN_RAW_ERR_FILTER, 0x1FFFFFFF)
     sock.settimeout(1.0)
@@ -148,16 +148,16 @@ def plumbing_slcan(t):
     while not adapter.open and time.monotonic() < until:  # the adapter runs in its own thread
         time.sleep(0.01)
     t.check(b"S8" in adapter.commands and adapter.open, f"set up with {adapter.commands}")
-    with hear_errors(adapter.interface) as sock:
+    with receive_errors(adapter.interface) as sock:
         sock.send(FRAME_512)
         sock.send(FRAME.pack(0x1234567 | EXTENDED, 8, 0, 0, b"abcdefgh"))
         time.sleep(0.05)
-        t.check(adapter.taken == [(512, 3, b"\1\2\3"), (0x1234567 | EXTENDED, 8, b"abcdefgh")], f"took {adapter.taken}")
+        t.check(adapter.received == [(512, 3, b"\1\2\3"), (0x1234567 | EXTENDED, 8, b"abcdefgh")], f"received {adapter.received}")
         for line, wanted in ((b"t1004000F0000\r", (256, 4)), (b"r1004\r", (256 | REMOTE, 4)), (b"T000001001FF\r", (256 | EXTENDED, 1))):
             adapter.write(line)
             t.check(FRAME.unpack(sock.recv(16))[:2] == wanted, f"{line} arrives")
         for state, at, bits in (("passive", 1, 0x30), ("active", 1, 0x40), ("bus_off", None, None)):
-            adapter.tell(state)
+            adapter.report(state)
             can_id, _, _, _, data = FRAME.unpack(sock.recv(16))
             good = can_id & ERROR and (can_id & 0x40 if at is None else data[at] & bits)
             t.check(good, f"{state}: error frame {can_id:08X} {data.hex()}")
@@ -177,7 +177,7 @@ def plumbing_slcan(t):
 def stall(t, adapter, sock):
     """The number of frames that a stalled adapter accepts before the kernel reports it; they come out stale."""
     sock.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
-    taken = len(adapter.taken)
+    before = len(adapter.received)
     adapter.stall(True)
     time.sleep(0.05)
     accepted = 0
@@ -189,5 +189,5 @@ def stall(t, adapter, sock):
     t.check(0 < accepted < 2000, f"{accepted} frames accepted by a stalled adapter")
     adapter.stall(False)
     time.sleep(0.5)
-    t.check(len(adapter.taken) - taken == accepted, f"{len(adapter.taken) - taken} of {accepted} come out afterwards")
+    t.check(len(adapter.received) - before == accepted, f"{len(adapter.received) - before} of {accepted} come out afterwards")
     t.figure(f"a stalled adapter accepts {accepted} frames")

@@ -24,8 +24,8 @@ class Rehearsal(GuestRun):
 
     def __init__(self, t, function):
         folder = tempfile.mkdtemp(prefix="iwheel-rehearsal-")
-        super().__init__({**t.plan, "results": os.path.join(folder, "planted.results")})
-        self.entry = Entry("planted", "planted", function, (), 0, VcanRig, 1)
+        super().__init__({**t.plan, "results": os.path.join(folder, "seeded.results")})
+        self.entry = Entry("seeded", "seeded", function, (), 0, VcanRig, 1)
         self.attempts = 0
 
     def work_off(self, _):
@@ -41,7 +41,7 @@ class Rehearsal(GuestRun):
 def drive_while(halt, afterwards=None):
     """A test that drives on while a process or the machine is stopped."""
 
-    def planted(t):
+    def seeded(t):
         rig, client = t.running()
         t.arm(client)
         stream = Streamer(client, 300, 300)
@@ -54,7 +54,7 @@ def drive_while(halt, afterwards=None):
             afterwards(rig)
         t.judge(rig)
 
-    return planted
+    return seeded
 
 
 def halt_gateway(_, rig):
@@ -94,7 +94,7 @@ def verdict_on(t, halt, afterwards=None):
     """(verdict, rehearsal, failures) of the runner."""
     t.plan["asks"] = t.plan["results"].rsplit(".", 1)[0]
     rehearsal = Rehearsal(t, drive_while(halt, afterwards))
-    verdict, attempt, _ = rehearsal.again("planted")
+    verdict, attempt, _ = rehearsal.again("seeded")
     return verdict, rehearsal, [failure.text for failure in attempt.failures]
 
 

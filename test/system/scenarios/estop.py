@@ -19,7 +19,7 @@ WORST_US = 150_000  # of one press; the 99th percentile of all presses together 
 
 
 def reset(t, client, seconds=4.0):
-    """Resets as soon as it is accepted. Returns the reasons given before."""
+    """Repeats reset until the gateway accepts it. Returns the errors of the refusals."""
     reasons, end = [], time.monotonic() + seconds
     while True:
         reply = client.request("reset")
@@ -171,7 +171,7 @@ def row13_contact_stuck(t):
         t.check(not client.request("reset")["ok"], "no reset while both are pressed")
         rig.release()
         reset(t, client)
-        t.check(client.request("status")["estop"]["state"] == "released", "mended")
+        t.check(client.request("status")["estop"]["state"] == "released", "the e-stop is released")
     t.arm(client)
     t.drive_for(client, 200, 200, 0.5)
     t.judge(rig, estop_limit_us=WORST_US)

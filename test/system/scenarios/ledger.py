@@ -23,15 +23,15 @@ def confirm_by_the_operator(t):
     t.expect(refusal, "denied")
     t.check("mount_sign_left" in refusal["message"], f"the refusal names the item: {refusal['message']}")
     t.expect(client.request("confirm", item="mount_sign_left"))
-    ledger = client.request("status")["ledger"]
-    t.check(ledger["wheel_radius"]["state"] == "confirmed", "the radius stays confirmed after a refused value")
+    assumptions = client.request("status")["ledger"]
+    t.check(assumptions["wheel_radius"]["state"] == "confirmed", "the radius stays confirmed after a refused value")
     t.rule(not rig.bus.setpoints(), "none of these requests sends a setpoint")
     t.arm(client)
     t.drive_for(client, 150, 150, 0.3)
     t.judge(rig)
 
 
-@scenario("confirm: how it was found is reported and stored; a contradicted track refuses turns, and nothing else", 6)
+@scenario("confirm stores and reports the method of the person; a contradicted track refuses only turns", 6)
 def confirm_how_and_track(t):
     rig, client = t.running({"wheels": {"track_mm": 540}})
     entry = client.request("status")["ledger"]["track"]
@@ -69,11 +69,11 @@ def contradicted_sign_refuses_arm(t):
     rig.sim.ask("sign both normal")
     wait_reset(t, client)
     # The wheel that is judged first stops both, which ends the comparison of the other one.
-    ledger = client.request("status")["ledger"]
-    signs = [name for name in ("feedback_sign_left", "feedback_sign_right") if ledger[name]["state"] == "contradicted"]
-    t.check(signs, f"one is contradicted by the bus: {ledger}")
+    assumptions = client.request("status")["ledger"]
+    signs = [name for name in ("feedback_sign_left", "feedback_sign_right") if assumptions[name]["state"] == "contradicted"]
+    t.check(signs, f"one is contradicted by the bus: {assumptions}")
     for name in signs:
-        t.check(ledger[name]["figure"] < 0 and "measured -" in ledger[name]["reason"], f"contradicted by the bus: {ledger[name]}")
+        t.check(assumptions[name]["figure"] < 0 and "measured -" in assumptions[name]["reason"], f"contradicted by the bus: {assumptions[name]}")
     t.expect(client.arm(), "denied")
     for name in signs:
         t.expect(client.request("confirm", item=name))
@@ -158,7 +158,7 @@ def tare_refused_with_the_reason(t):
     t.expect(reply)
     t.check(abs(reply["left"]["offset_mN"] - 12300) < 500 and reply["left"]["samples"] == 40, f"left {reply.get('left')}")
     t.check(abs(reply["right"]["offset_mN"] - 9800) < 500, f"right {reply.get('right')}")
-    rig.sim.ask("zero left 45")  # A weight that does not sway.
+    rig.sim.ask("zero left 45")  # A constant weight: the samples do not vary.
     time.sleep(2.6)
     refused("denied", "far from its earlier zero")
     rig.sim.ask("raw left 32767")

@@ -209,7 +209,7 @@ def row30_two_gateways(t):
     t.judge(rig)
 
 
-@scenario("the socket's path is taken: replaces its own leftover, refuses anything else", 4)
+@scenario("the socket's path exists: replaces its own leftover, refuses anything else", 4)
 def row28_socket_path(t):
     rig = t.rig()
     path = rig.path("gateway.sock")

@@ -43,8 +43,8 @@ def answered(rig, client):
     return rig.wait_status(client, lambda s: s["memory"]["state"] != "loading", 2)
 
 
-def keeper_of(gateway):
-    return children(gateway.child.pid)["iwheel-keeper"]
+def store_process(gateway):
+    return children(gateway.child.pid)["iwheel-store"]
 
 
 @scenario("a tare and the operator's confirmation survive kill -9, and nothing changes the zero afterwards", 16)
@@ -219,7 +219,7 @@ def memory_without_a_place(t):
     t.arm(client)
     stream = Streamer(client, 300, 300, 0.02)
     time.sleep(0.5)
-    os.kill(keeper_of(rig.gateway), signal.SIGKILL)
+    os.kill(store_process(rig.gateway), signal.SIGKILL)
     client.request("confirm", item="mount_sign_left")
     time.sleep(1.5)
     stream.stop()

@@ -104,6 +104,14 @@ BAD_LINES = [
     (b'{"cmd":"hello","id":{}}', "bad_value"),
 ]
 
+# The gateway refuses a stop for none of its fields.
+ODD_STOPS = [
+    b'{"cmd":"stop","t_us":1}',
+    b'{"cmd":"disarm","key":"x","id":1.5}',
+    b'{"cmd":"estop","reason":"' + b"x" * 201 + b'"}',
+    b'{"cmd":"estop","reason":"Traceback:\\n line","now":true}',
+]
+
 
 @scenario("bad UTF-8, NUL, depth, 1e999, NaN, 1.5, double and unknown keys: refused as a whole", 5)
 def row09_odd_json(t):
@@ -128,6 +136,12 @@ def row09_odd_json(t):
             )
         client.close()
     t.figure(f"{len(BAD_LINES)} lines")
+    for line in ODD_STOPS:
+        client = rig.client()
+        client.read_line()
+        client.send_raw(line + b"\n")
+        t.rule(client.read_reply(2)["ok"], f"{line[:70]!r} is executed")
+        client.close()
     t.rule(not any(speed for _, _, speed in rig.bus.setpoints()), "nothing moved")
     t.expect(observer.request("hello"))
     t.judge(rig, moves=False)

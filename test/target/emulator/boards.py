@@ -18,7 +18,7 @@ NO_DEVICE = None, (None, 0), None, None  # Its clock is never on.
 class Board:
     """What all have in common. `blocks`: address of a block -> (name, its clock: offset in RCC and bit, or None)."""
 
-    can_address = 0x40006400
+    can_address, can_ram_address = 0x40006400, 0
     pins = {"estop": ("port_b", 0), "button": ("port_a", 1)}
     uart_pins, can_pairs = ("port_a", 3, 2), {"PB8": ("port_b", 8, 9), "PA11": ("port_a", 11, 12)}
     ports = ("port_a", "port_b", "port_c", "port_d")
@@ -37,8 +37,8 @@ class Board:
         machine.exti, machine.watchdog, machine.uart = chip.Exti(), chip.Watchdog(machine, self.lsi_hz), self.uart(machine)
         machine.dma, machine.flash = self.dma(machine), self.flash(machine)
         machine.map_flash(machine.flash)
-        for name in self.ports:
-            setattr(machine, name, self.port())
+        for name, cached in zip(self.ports, machine.clock.inputs, strict=True):
+            setattr(machine, name, self.port(cached))
         machine.can = self.controller(machine)
         machine.bus = Bus(machine, seed)
         machine.can_listens = False  # Clocked and on its pins.
@@ -46,6 +46,12 @@ class Board:
         self.machine = machine
         self.drive("estop", 0)  # The contact is closed.
         self.devices = {block: (name, clock, *self.accessors(name)) for block, (name, clock) in self.blocks.items()}
+        for block, (name, _) in self.blocks.items():
+            if name in self.ports:
+                port = getattr(machine, name)
+                port.cached.address = block + port.input_offset
+        machine.clock.can_blocks[:] = self.can_address, self.can_ram_address
+        machine.clock.read_can = machine.can.address_of_read()
 
     def reset(self, machine):
         machine.bus.chip_vanishes()
@@ -61,7 +67,7 @@ class Board:
         ):
             part.reset()
         self.remap, self.multiplexer = 0, {}
-        machine.can_listens = False
+        machine.can_listens, machine.clock.can = False, None
 
     remap, multiplexer = 0, {}  # AFIO_MAPR, DMAMUX
 
@@ -84,7 +90,11 @@ class Board:
 
     def interrupts(self, machine):
         """The interrupts whose lines are up, each a bit."""
-        lines = self.can_interrupts(machine.can.lines()) | machine.exti.line() << IRQ_EXTI0
+        lines = machine.can.lines()
+        if lines:
+            lines = self.can_interrupts(lines)
+        if machine.exti.line():
+            lines |= 1 << IRQ_EXTI0
         if not machine.enabled >> IRQ_SERIAL_RECEIVE & SERIAL:
             return lines
         dma = machine.dma
@@ -110,7 +120,7 @@ class Board:
         clocks, watchdog = machine.clocks, machine.watchdog
         if name in self.ports:
             port = getattr(machine, name)
-            return port.read, lambda offset, value: self.write_port(port, offset, value)
+            return lambda offset: self.read_port(port, offset), lambda offset, value: self.write_port(port, offset, value)
         return {
             "rcc": (lambda offset: clocks.read(offset, machine.now_ns), self.write_clocks),
             "flash": (machine.flash.read, machine.flash.write),
@@ -124,13 +134,23 @@ class Board:
             "multiplexer": (lambda offset: self.multiplexer.get(offset, 0), lambda offset, value: self.multiplexer.update({offset: value})),
         }[name]
 
+    def read_port(self, port, offset):
+        value = port.read(offset)
+        if offset == port.input_offset:
+            port.cached.value, port.cached.is_known = value, 1
+        return value
+
     def write_port(self, port, offset, value):
         if port.write(offset, value):
             self.connect_can()
             self.machine.look_at_pins()
 
     def write_clocks(self, offset, value):
-        self.machine.clocks.write(offset, value, self.machine.now_ns)
+        machine = self.machine
+        machine.clocks.write(offset, value, machine.now_ns)
+        for cached in machine.clock.inputs:
+            cached.is_known = 0
+        machine.clock.can = machine.can.model if machine.clocks.is_enabled(*self.blocks[self.can_address][1]) else None
         self.connect_can()
 
     def write_selection(self, offset, value):
@@ -224,7 +244,7 @@ class Stm32g474(Board):
     name, cpu_model, banks, lsi_hz, lsi_limits_hz = "stm32g474", arm.UC_CPU_ARM_CORTEX_M4, 0, 32_000, (29_500, 34_000)
     dma, flash, unique_id_address, uart, controller = chip_g4.DmaG4, chip_g4.FlashG4, 0x1FFF7590, chip_g4.UartG4, FdController
     clocks, port, lamp, can_default = chip_g4.ClocksG4, chip_g4.PortG4, ("port_a", 5, 1), "PA11"
-    ram_size = 96 * 1024
+    ram_size, can_ram_address = 96 * 1024, 0x4000A400
     spaces = ((0x40000000, 0x30000), (0x48000000, 0x2000))
     blocks = {
         0x40021000: ("rcc", None),

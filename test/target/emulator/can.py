@@ -116,6 +116,9 @@ class Controller:
     def reset(self):
         getattr(self.library, f"{self.kind}_model_reset")(self.model, self.machine.board.banks)
 
+    def address_of_read(self):
+        return ctypes.cast(getattr(self.library, f"{self.kind}_model_read"), ctypes.c_void_p)
+
     def is_passive(self):
         return bool(self.read(0x18) & 2)  # ESR.EPVF
 
@@ -234,23 +237,28 @@ class Bus:
         self.suspended_ns = 0  # Until then the chip may not begin: an error-passive node waits 8 bits after each of its frames.
 
     def next_event_ns(self, now_ns):
-        times = [wheel.next_ns for wheel in self.wheels if wheel.next_ns is not None]
+        due_ns = NEVER_NS
+        for wheel in self.wheels:
+            if wheel.next_ns is not None and wheel.next_ns < due_ns:
+                due_ns = wheel.next_ns
         if self.current:
-            times.append(self.current[2])
             self.calm = True
-        elif self.stuck:
+            return min(due_ns, self.current[2])
+        if self.stuck:
             self.calm = False
-        else:
-            self.calm = not self.machine.can_listens or self.machine.can.is_on()
-            if self.extra or self.flood or self.wheels[0].queue or self.wheels[1].queue:
-                times.append(max(self.idle_ns, now_ns))
-            if self.idle_ns > now_ns:
-                times.append(self.idle_ns)
-            if self.suspended_ns > now_ns:
-                times.append(self.suspended_ns)
-            if not self.calm:
-                times.append(now_ns + 11 * BIT_NS)
-        return min(times, default=NEVER_NS)
+            return due_ns
+        self.calm = not self.machine.can_listens or self.machine.can.is_on()
+        if self.is_wanted():
+            due_ns = min(due_ns, max(self.idle_ns, now_ns))
+        if now_ns < self.idle_ns < due_ns:
+            due_ns = self.idle_ns
+        if now_ns < self.suspended_ns < due_ns:
+            due_ns = self.suspended_ns
+        return due_ns if self.calm else min(due_ns, now_ns + 11 * BIT_NS)
+
+    def is_wanted(self):
+        """Another node than the chip has a frame to send."""
+        return bool(self.extra or self.flood or self.wheels[0].queue or self.wheels[1].queue)
 
     def hold_dominant(self, on):
         self.stuck = on
@@ -296,7 +304,7 @@ class Bus:
             self.finish()
         if not self.current:
             bits = (now_ns - self.idle_ns) // BIT_NS
-            if bits > 0 and not self.machine.can.is_on() and self.machine.can_listens:
+            if bits > 0 and self.machine.can_listens and not self.machine.can.is_on():
                 self.machine.can.recessive(bits)
             if bits >= 0:
                 self.idle_ns += bits * BIT_NS
@@ -304,7 +312,7 @@ class Bus:
 
     def arbitrate(self, now_ns):
         mailbox, frame = self.machine.can.offered() if self.machine.can_listens and now_ns >= self.suspended_ns else (None, None)
-        for offer in self.offers():
+        for offer in self.offers() if self.is_wanted() else ():
             if frame is None or offer.id < frame.id:  # Of one identifier the first wins, before all others the chip.
                 frame, mailbox = offer, None
         if frame is None:

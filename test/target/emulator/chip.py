@@ -30,7 +30,8 @@ class Clocks:
         self.pllcfgr = 0x24003010
         self.enable, self.acr_is_read = {}, False
         self.hse_ready_ns = self.pll_ready_ns = None
-        self.core_hz, self.settled = self.internal_hz, False
+        self.crystal_failed, self.settled = False, False
+        self.set_core_hz(self.internal_hz)
 
     def set_crystal(self, present):
         self.crystal_present, self.settled = present, False
@@ -44,7 +45,7 @@ class Clocks:
             self.hse_ready_ns = None
         hse = self.hse_ready_ns is not None and now_ns >= self.hse_ready_ns
         if self.cr & HSERDY and not hse and self.cr & CSSON:
-            self.chip.nmi = True
+            self.chip.nmi = self.crystal_failed = True
             self.cr &= ~(HSEON | CSSON | PLLON)
         source_ready = hse if self.pll_from_hse() else True
         if self.cr & PLLON and source_ready and self.pll_ready_ns is None:
@@ -58,7 +59,11 @@ class Clocks:
         if (switched == 2 and not pll) or (switched == 1 and not hse):
             switched = 0
         self.cfgr = self.cfgr & ~0xC | switched << 2
-        self.core_hz = (self.internal_hz, self.crystal_hz, self.pll_hz() if switched == 2 else 0)[switched]
+        self.set_core_hz((self.internal_hz, self.crystal_hz, self.pll_hz() if switched == 2 else 0)[switched])
+
+    def set_core_hz(self, core_hz):
+        assert core_hz > 0, "the core has no clock"
+        self.core_hz = self.chip.clock.core_hz = core_hz
 
     def runs_from_crystal(self):
         """The core runs on the PLL, and the PLL on the crystal."""
@@ -191,18 +196,24 @@ class ClocksF446(ClocksF4):
 
 
 class Port:
-    """`outside` maps a pin to the level that drives it; a pin without is open."""
+    """`outside` maps a pin to the level that drives it; a pin without is open. `cached`: the input register in block_hook.c."""
 
-    def __init__(self):
-        self.outside, self.changed = {}, True
+    def __init__(self, cached):
+        self.outside, self.changed, self.cached = {}, True, cached
         self.reset()
 
     def drive(self, pin, level):
-        self.outside[pin], self.changed, self.levels = level, True, None
+        self.outside[pin], self.changed = level, True
+        self.forget()
 
     def release(self, pin):
         self.outside.pop(pin, None)
-        self.changed, self.levels = True, None
+        self.changed = True
+        self.forget()
+
+    def forget(self):
+        """A level may have changed."""
+        self.levels, self.cached.is_known = None, 0
 
     def input(self):
         """The levels of all pins; cached until one changes."""
@@ -212,8 +223,11 @@ class Port:
 
 
 class PortF1(Port):
+    input_offset = 8
+
     def reset(self):
-        self.changed, self.levels = True, None
+        self.changed = True
+        self.forget()
         self.cr, self.odr = [0x44444444, 0x44444444], 0
 
     def field(self, pin):
@@ -237,13 +251,13 @@ class PortF1(Port):
     def read(self, offset):
         if offset in (0, 4):
             return self.cr[offset // 4]
-        return self.input() if offset == 8 else self.odr if offset == 0xC else 0
+        return self.input() if offset == self.input_offset else self.odr if offset == 0xC else 0
 
     def write(self, offset, value):
         """True if that may have changed a level."""
         if offset == 0x10 and (self.odr & ~(value >> 16) | value & 0xFFFF) == self.odr:
             return False
-        self.levels = None
+        self.forget()
         if offset in (0, 4):
             self.cr[offset // 4] = value
         elif offset == 0x10:
@@ -256,8 +270,11 @@ class PortF1(Port):
 
 
 class PortF4(Port):
+    input_offset = 0x10
+
     def reset(self):
-        self.changed, self.levels = True, None
+        self.changed = True
+        self.forget()
         self.registers = dict.fromkeys(range(0, 0x28, 4), 0)
         self.registers[0] = 0xA8000000
 
@@ -280,7 +297,7 @@ class PortF4(Port):
         return self.two(0, rx) == 2 and self.two(0, tx) == 2 and function == [wanted, wanted] and self.two(8, tx) != 0
 
     def read(self, offset):
-        return self.input() if offset == 0x10 else self.registers[offset]
+        return self.input() if offset == self.input_offset else self.registers[offset]
 
     def write(self, offset, value):
         """True if that may have changed a level."""
@@ -288,7 +305,8 @@ class PortF4(Port):
             offset, value = 0x14, self.registers[0x14] & ~(value >> 16) | value & 0xFFFF
         if self.registers[offset] == value:
             return False
-        self.registers[offset], self.levels = value, None
+        self.registers[offset] = value
+        self.forget()
         return True
 
 
@@ -485,9 +503,12 @@ class DmaChannel:
     def carry(self, now_ns):
         """From memory to DR."""
         uart = self.chip.uart
-        while self.left and self.is_on() and self.next_move_ns() <= now_ns:
-            count = min(self.left, (now_ns - self.next_move_ns()) // uart.byte_ns() + 1)
-            uart.transmit(self.chip.cpu.mem_read(self.registers["memory"] + self.length - self.left, count), self.next_move_ns())
+        while self.left and self.is_on():
+            move_ns = self.next_move_ns()
+            if move_ns > now_ns:
+                break
+            count = min(self.left, (now_ns - move_ns) // uart.byte_ns() + 1)
+            uart.transmit(self.chip.cpu.mem_read(self.registers["memory"] + self.length - self.left, count), move_ns)
             self.left -= count
             if self.left == 0:
                 self.finish()
@@ -533,20 +554,19 @@ class Dma:
         self.reset()
 
     def reset(self):
-        self.receive, self.transmit = self.kind(self.chip), self.kind(self.chip)
+        self.receive, self.transmit = channels = self.kind(self.chip), self.kind(self.chip)
+        both = zip(channels, self.bases, strict=True)
+        self.places = {base + 4 * index: (channel, name) for channel, base in both for index, name in enumerate(channel.offsets)}
 
     def advance(self, now_ns):
-        self.transmit.carry(now_ns)
+        if self.transmit.left:
+            self.transmit.carry(now_ns)
 
     def next_event_ns(self):
-        return self.transmit.next_event_ns()
+        return self.transmit.next_event_ns() if self.transmit.left else None
 
     def find(self, offset):
-        for channel, base in zip((self.receive, self.transmit), self.bases, strict=True):
-            index = (offset - base) // 4
-            if 0 <= index < len(channel.offsets):
-                return channel, channel.offsets[index]
-        return None, None
+        return self.places.get(offset & ~3, (None, None))
 
     def read(self, offset):
         self.chip.uart.advance(self.chip.now_ns)

@@ -28,6 +28,10 @@ class ClocksG4(chip.Clocks):
         super().update(now_ns)
         self.cfgr = wanted & ~0xC | ((self.cfgr >> 2 & 3) + 1) << 2
 
+    def read(self, offset, now_ns):
+        """RCC_CIFR: CSSF, as far as the port reads it."""
+        return self.crystal_failed << 8 if offset == 0x1C else super().read(offset, now_ns)
+
     def write(self, offset, value, now_ns):
         if offset == self.csr_offset:
             self.flags = 0 if value >> 23 & 1 else self.flags
@@ -121,16 +125,20 @@ class ChannelG4(chip.ChannelF1):
 class DmaG4(chip.DmaF1):
     kind = ChannelG4
 
+    def write(self, offset, value):
+        self.chip.expect(offset != self.clear_offset or not value & 0x1111111, "CGIF was written: a transfer error at that moment would be lost")
+        super().write(offset, value)
+
 
 class FlashG4(chip.Flash):
     """3.7: the last 8 KiB, of which the store has the first 2 of each 4. Two words are one write. `broken`: 64 bits whose write was cut off: reading
-    them raises the NMI."""
+    them raises the NMI. `eccr_lost`: the operation that was cut off has damaged ECCR too (ES0430 2.2.3)."""
 
     base, size, lock, unit, program_ns, erase_ns = 0x0807E000, 0x2000, 1 << 31, 4, 85 * US, 25 * MS
     two_banks = True  # The option DBANK.
 
     def __init__(self, machine):
-        self.broken = set()
+        self.broken, self.eccr_lost = set(), False
         super().__init__(machine)
 
     def reset(self):
@@ -139,13 +147,22 @@ class FlashG4(chip.Flash):
 
     def fetch(self, address, size):
         if address & ~7 in self.broken:
-            self.eccr |= 1 << 31
-            self.chip.nmi = True
-            self.chip.clock.is_asked_to_stop = 1
-            self.chip.touch()
+            self.report(0 if self.eccr_lost else 1 << 31)
         return super().fetch(address, size)
 
+    def report(self, flags):
+        self.eccr |= flags
+        self.chip.nmi = True
+        self.chip.clock.is_asked_to_stop = 1
+        self.chip.touch()
+
+    def expect_no_cache(self):
+        """ES0430 2.2.2. The image runs from bank 1."""
+        clocks = self.chip.clocks
+        self.chip.expect(not self.two_banks or not clocks.acr & clocks.cache_on, "bank 2 of the flash was changed with the data cache on")
+
     def program(self, address, size, value):
+        self.expect_no_cache()
         self.chip.expect(size == 4, f"the flash was written with {size} bytes at a time")
         if not address & 4:
             self.half = address, value
@@ -179,6 +196,7 @@ class FlashG4(chip.Flash):
         """3.3: PER, STRT, and the number of the page in its bank."""
         if self.cr & 0x10002 != 0x10002:
             return
+        self.expect_no_cache()
         page = self.cr >> 3 & 0x7F
         size = 0x800 if self.two_banks else 0x1000
         address = 0x08000000 + page * size + (0x40000 if self.two_banks and self.cr >> 11 & 1 else 0)

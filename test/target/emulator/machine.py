@@ -27,6 +27,7 @@ from unicorn import (
 from unicorn import arm_const as arm
 from unicorn.unicorn_py3.unicorn import MMIO_READ_CFUNC, MMIO_WRITE_CFUNC, uclib
 
+from .block_clock import ENTERED, MASKED, READ_CFUNC, WRITE_CFUNC, BlockClock, Space, declare
 from .boards import BLOCK_SIZE
 from .chip import IWDGRSTF, PINRSTF, PORRSTF, SFTRSTF, US
 from .registers import Registers
@@ -41,22 +42,9 @@ SP, LR, PC, XPSR, PRIMASK = (getattr(arm, f"UC_ARM_REG_{name}") for name in ("SP
 FRAME = (arm.UC_ARM_REG_R0, arm.UC_ARM_REG_R1, arm.UC_ARM_REG_R2, arm.UC_ARM_REG_R3, arm.UC_ARM_REG_R12, LR, PC, XPSR)
 IT_STATE = 0x0600FC00
 NMI, HARD_FAULT, SYSTICK, IRQ = 2, 3, 15, 16
-FLASH = 0x08000000
+FLASH, SYSTEM = 0x08000000, 0xE000E000
 IBUSERR, PRECISERR, STKERR = 1 << 8, 1 << 9 | 1 << 15, 1 << 12  # Bits of CFSR.
 NO_MEMORY = (UC_ERR_READ_UNMAPPED, UC_ERR_WRITE_UNMAPPED, UC_ERR_WRITE_PROT, UC_ERR_FETCH_UNMAPPED, UC_ERR_FETCH_PROT)
-
-
-class BlockClock(ctypes.Structure):
-    """As in block_hook.c."""
-
-    _fields_ = [
-        ("left", ctypes.c_int64),
-        ("spent", ctypes.c_int64),
-        ("is_asked_to_stop", ctypes.c_int32),
-        ("has_stopped", ctypes.c_int32),
-        ("trap", ctypes.c_int32),
-        ("stop", ctypes.c_void_p),
-    ]
 
 
 class Machine:
@@ -68,7 +56,7 @@ class Machine:
         self.board, self.image, self.now_ns = board, image, 0
         self.violations, self.resets, self.alarms = [], [], []
         self.nmi, self.frozen, self.power_lost = False, False, False
-        self.busy_ns = self.faults = 0
+        self.faults = 0
         self.due_ns = self.quiet_until_ns = 0  # See run.
         self.build_cpu()
         board.build(self, seed)
@@ -88,13 +76,13 @@ class Machine:
         cpu.mem_map(self.board.unique_id_address & ~0xFFF, 0x1000, UC_PROT_READ)  # The manufacturer wrote it: the chip's own number.
         cpu.mem_write(self.board.unique_id_address, bytes(range(0x41, 0x4D)))
         self.frame, self.after_entry = Registers(cpu, *FRAME, SP, PRIMASK), Registers(cpu, SP, XPSR, LR, PC)
-        self.after_exit, self.pc = Registers(cpu, SP, *FRAME), Registers(cpu, PC)
-        self.stack, self.result = Registers(cpu, SP), Registers(cpu, *FRAME[:2])
+        self.pc, self.result = Registers(cpu, PC), Registers(cpu, *FRAME[:2])
         self.error, self.callbacks, self.until = None, [], NOWHERE
-        for base, size in self.board.spaces:
-            self.map_registers(base, size, self.board.read, self.board.write)
-        self.map_registers(0xE000E000, 0x1000, self.read_system, self.write_system)
-        self.clock = BlockClock(stop=ctypes.cast(uclib.uc_emu_stop, ctypes.c_void_p).value)
+        declare(self.library)
+        self.clock = BlockClock(ACCESS_CYCLES, self.board.ram_size, cpu, (*FRAME, SP, PRIMASK), (READ_CFUNC(self.on_read), WRITE_CFUNC(self.on_write)))
+        self.clock_reference = ctypes.byref(self.clock)
+        for base, size in (*self.board.spaces, (SYSTEM, 0x1000)):
+            self.map_registers(base, size)
         for kind, function in ((UC_HOOK_BLOCK, self.library.block_hook), (UC_HOOK_INTR, self.library.trap_hook)):
             uclib.uc_hook_add(
                 cpu._uch,
@@ -112,37 +100,33 @@ class Machine:
 
     # ---- time and code --------------------------------------------------------------------------------------------
 
-    def spend(self, cycles=0):
+    @property
+    def busy_ns(self):
+        """The time in which code ran."""
+        return self.clock.busy_ns
+
+    def spend(self, cycles):
         """Brings `now_ns` up to date with the code that has run, and `cycles` more."""
-        clock = self.clock
-        span_ns = (clock.spent + cycles) * 10**9 // self.clocks.core_hz
-        if cycles:
-            clock.left -= cycles
-        clock.spent = 0
-        self.now_ns += span_ns
-        self.busy_ns += span_ns
+        self.library.block_clock_spend(self.clock_reference, cycles)
+        self.now_ns = self.clock.now_ns
 
     def execute(self, until_ns):
         """Runs code until that time, a WFI, a trap, or something that may change which interrupts come."""
         clock = self.clock
-        clock.left = max((until_ns - self.now_ns) * self.clocks.core_hz // 10**9, 1)
-        clock.is_asked_to_stop = clock.has_stopped = 0
-        clock.trap = -1
-        (pc,) = self.pc.read()
-        status = uclib.uc_emu_start(self.cpu._uch, pc | 1, self.until, 0, 0)
+        status = self.library.block_clock_execute(self.clock_reference, until_ns, self.until, self.icsr())
+        self.now_ns = clock.now_ns
         if status in NO_MEMORY and self.error is None:
-            self.spend()
             self.hard_fault(IBUSERR if status in (UC_ERR_FETCH_UNMAPPED, UC_ERR_FETCH_PROT) else PRECISERR)
             return
         if status != UC_ERR_OK or self.error is not None:
-            raise RuntimeError(f"the CPU faulted at 0x{pc:08X}: {self.error or UcError(status)}") from self.error
-        self.spend()
-        if clock.trap == EXCEPTION_EXIT:
+            raise RuntimeError(f"the CPU faulted at 0x{clock.begun_at:08X}: {self.error or UcError(status)}") from self.error
+        trap = clock.trap
+        if trap == EXCEPTION_EXIT:
             self.leave_exception()
-        elif clock.trap in ABORTS:
-            self.hard_fault(IBUSERR if clock.trap == ABORTS[0] else PRECISERR)
-        elif clock.trap >= 0:
-            raise RuntimeError(f"trap {clock.trap} at 0x{self.pc.read()[0]:08X}")
+        elif trap in ABORTS:
+            self.hard_fault(IBUSERR if trap == ABORTS[0] else PRECISERR)
+        elif trap >= 0:
+            raise RuntimeError(f"trap {trap} at 0x{self.pc.read()[0]:08X}")
         elif not clock.has_stopped:
             self.sleeping = True
 
@@ -156,6 +140,7 @@ class Machine:
         stack -= 32
         if self.is_stack(stack):
             self.cpu.mem_write(stack, struct.pack("<8I", *values))
+        self.expect_vectors()
         self.after_entry.write(stack, values[7] & ~IT_STATE, EXC_RETURN, self.vector(HARD_FAULT))
 
     def at(self, time_ns, action):
@@ -171,9 +156,11 @@ class Machine:
         while self.now_ns < end_ns:
             if self.now_ns >= self.quiet_until_ns:
                 self.attend()
-            next_ns = max(min(end_ns, self.due_ns), self.now_ns + 1)
+            next_ns = self.due_ns if self.due_ns < end_ns else end_ns
+            if next_ns <= self.now_ns:
+                next_ns = self.now_ns + 1
             if self.frozen or (self.sleeping and not self.pending):
-                self.now_ns = next_ns
+                self.now_ns = self.clock.now_ns = next_ns
                 continue
             self.sleeping = False
             if self.pending and not self.active and self.enter_exception():
@@ -214,20 +201,16 @@ class Machine:
         """When the next event is due, and whether nothing can happen before. Not so while bytes pass between memory and line, which
         goes on with every cycle, nor while the bus or the clocks come to rest."""
         uart, due_ns = self.uart, self.bus.next_event_ns(self.now_ns)
-        times = [self.tick_ns, self.watchdog.deadline_ns]
-        calm = self.clocks.settled and self.bus.calm
-        if uart.typed or uart.idle_ns is not None:
-            times.append(uart.next_event_ns())
-            calm = False
         sent_ns = self.dma.next_event_ns()
-        if sent_ns is not None:
-            times.append(sent_ns)
-            calm = False
-        if self.alarms:
-            times.append(self.alarms[0][0])
-        for time_ns in times:
+        calm = self.clocks.settled and self.bus.calm and sent_ns is None
+        came_ns = None
+        if uart.typed or uart.idle_ns is not None:
+            came_ns, calm = uart.next_event_ns(), False
+        for time_ns in (self.tick_ns, self.watchdog.deadline_ns, came_ns, sent_ns):
             if time_ns is not None and time_ns < due_ns:
                 due_ns = time_ns
+        if self.alarms and self.alarms[0][0] < due_ns:
+            due_ns = self.alarms[0][0]
         self.due_ns, self.quiet_until_ns = due_ns, due_ns if calm else 0
 
     def attend(self):
@@ -240,7 +223,8 @@ class Machine:
         if self.uart.typed or self.uart.idle_ns is not None:
             self.uart.advance(self.now_ns)
         self.dma.advance(self.now_ns)
-        self.count_tick()
+        if self.tick_ns is not None and self.now_ns >= self.tick_ns:
+            self.count_tick()
         if self.port_a.changed or self.port_b.changed:
             self.look_at_pins()
         if self.watchdog.deadline_ns is not None and self.now_ns >= self.watchdog.deadline_ns:
@@ -274,21 +258,17 @@ class Machine:
     def enter_exception(self):
         if not self.pending or self.active:
             return False
-        *values, stack, masked = self.frame.read()
-        if masked and NMI not in self.pending:
-            return False
         number = min(self.pending)
+        entered = self.library.block_clock_enter(self.clock_reference, self.vector(number), number != NMI)
+        if entered == MASKED:
+            return False
+        self.expect_vectors()
         self.pending.discard(number)
         self.active = number
-        aligned = stack & 4
-        stack -= 32 + aligned
-        values[7] = values[7] & ~0x200 | (0x200 if aligned else 0)
-        if not self.is_stack(stack):
+        if entered == ENTERED:
+            self.now_ns = self.clock.now_ns
+        else:
             self.hard_fault(STKERR)
-            return True
-        self.cpu.mem_write(stack, struct.pack("<8I", *values))
-        self.after_entry.write(stack, values[7] & ~IT_STATE, EXC_RETURN, self.vector(number))  # A handler does not begin within an IT block.
-        self.spend(12)
         return True
 
     def is_stack(self, address):
@@ -297,19 +277,19 @@ class Machine:
 
     def vector(self, number):
         """From the table that VTOR selects. Address 0 shows the image, or the boot loader that has started it."""
-        self.expect(self.vtor or not self.is_started_by_boot_loader, "an exception went to the boot loader's handler")
         return struct.unpack_from("<I", self.image, (self.vtor or FLASH) - FLASH + 4 * number)[0]
 
+    def expect_vectors(self):
+        self.expect(self.vtor or not self.is_started_by_boot_loader, "an exception went to the boot loader's handler")
+
     def leave_exception(self):
-        (stack,) = self.stack.read()
-        values = list(struct.unpack("<8I", self.cpu.mem_read(stack, 32)))
-        stack += 32 + (4 if values[7] & 0x200 else 0)
-        values[7] &= ~0x200
-        self.after_exit.write(stack, *values)
+        status = self.library.block_clock_leave(self.clock_reference)
+        if status != UC_ERR_OK:
+            raise UcError(status)
+        self.now_ns = self.clock.now_ns
         if self.active != SYSTICK:
             self.touch()  # Its line may still be up.
         self.active = None
-        self.spend(12)
 
     def reset_cpu(self):
         stack, start = struct.unpack_from("<II", self.image)
@@ -321,7 +301,8 @@ class Machine:
         self.vtor = self.cfsr = 0
         self.is_started_by_boot_loader = False
         self.look_at_pins()
-        self.tick_ns, self.syst = None, {0x10: 0, 0x14: 0, 0x18: 0}
+        self.syst = {0x10: 0, 0x14: 0, 0x18: 0}
+        self.set_tick(None)
 
     def start_by_boot_loader(self):
         """As the chip's own one in its system memory does after "Go": its vectors stay at address 0, and it may leave interrupts masked."""
@@ -339,32 +320,35 @@ class Machine:
 
     # ---- registers ------------------------------------------------------------------------------------------------
 
-    def map_registers(self, base, size, read, write):
-        """`read` and `write` get the address of the block and the offset in it. What they raise ends the emulation."""
-
-        def on_read(_, offset, size, __):
-            try:
-                self.spend(ACCESS_CYCLES)
-                if size != 4:
-                    self.expect(False, f"0x{base + offset:08X} was accessed with {size} bytes")
-                return read(base + offset & -BLOCK_SIZE, offset & BLOCK_SIZE - 1) & 0xFFFFFFFF
-            except Exception as error:  # noqa: BLE001
-                return self.fail(error)
-
-        def on_write(_, offset, size, value, __):
-            try:
-                self.spend(ACCESS_CYCLES)
-                if size != 4:
-                    self.expect(False, f"0x{base + offset:08X} was accessed with {size} bytes")
-                write(base + offset & -BLOCK_SIZE, offset & BLOCK_SIZE - 1, value)
-            except Exception as error:  # noqa: BLE001
-                self.fail(error)
-
-        callbacks = (MMIO_READ_CFUNC(on_read), MMIO_WRITE_CFUNC(on_write))
-        self.callbacks += callbacks
-        status = uclib.uc_mmio_map(self.cpu._uch, base, size, *(pair for function in callbacks for pair in (ctypes.cast(function, ctypes.c_void_p), 0)))
+    def map_registers(self, base, size):
+        """Reads that change nothing but the time are done by block_hook.c, which calls `on_read` for all others."""
+        space = ctypes.pointer(Space(ctypes.pointer(self.clock), base))
+        self.callbacks.append(space)
+        read, write = (ctypes.cast(function, ctypes.c_void_p) for function in (self.library.block_clock_read, self.library.block_clock_write))
+        status = uclib.uc_mmio_map(self.cpu._uch, base, size, read, space, write, space)
         if status != UC_ERR_OK:
             raise UcError(status)
+
+    def on_read(self, now_ns, address, size):
+        """What it raises ends the emulation."""
+        self.now_ns = now_ns
+        try:
+            if size != 4:
+                self.expect(False, f"0x{address:08X} was accessed with {size} bytes")
+            read = self.read_system if address >= SYSTEM else self.board.read
+            return read(address & -BLOCK_SIZE, address & BLOCK_SIZE - 1) & 0xFFFFFFFF
+        except Exception as error:  # noqa: BLE001
+            return self.fail(error)
+
+    def on_write(self, now_ns, address, size, value):
+        self.now_ns = now_ns
+        try:
+            if size != 4:
+                self.expect(False, f"0x{address:08X} was accessed with {size} bytes")
+            write = self.write_system if address >= SYSTEM else self.board.write
+            write(address & -BLOCK_SIZE, address & BLOCK_SIZE - 1, value)
+        except Exception as error:  # noqa: BLE001
+            self.fail(error)
 
     def fail(self, error):
         self.error = self.error or error
@@ -383,6 +367,7 @@ class Machine:
             return int.from_bytes(before[address - base : address - base + size], "little")
 
         def guard(function, *arguments):
+            self.now_ns = self.clock.now_ns
             try:
                 return function(*arguments)
             except Exception as error:  # noqa: BLE001
@@ -408,32 +393,41 @@ class Machine:
     def tick_span_ns(self):
         return (self.syst[0x14] + 1) * 10**9 // self.clocks.core_hz
 
+    def set_tick(self, tick_ns):
+        self.tick_ns = tick_ns
+        self.clock.tick_ns, self.clock.tick_load = -1 if tick_ns is None else tick_ns, self.syst[0x14]
+
     def count_tick(self):
         """The tick that is due, before its interrupt."""
         if self.tick_ns is not None and self.now_ns >= self.tick_ns:
             self.clock.is_asked_to_stop = 1
             self.pending.add(SYSTICK)
-            self.tick_ns += self.tick_span_ns()
+            self.clock.icsr = self.icsr()
+            self.set_tick(self.tick_ns + self.tick_span_ns())
+
+    def icsr(self):
+        """PENDSTSET, VECTACTIVE."""
+        return (SYSTICK in self.pending) << 26 | (self.active or 0)
 
     def read_system(self, block, offset):
-        offset += block - 0xE000E000
+        offset += block - SYSTEM
         self.count_tick()
         if offset == 0x18 and self.tick_ns is not None:
             return min((self.tick_ns - self.now_ns) * self.clocks.core_hz // 10**9, self.syst[0x14])
-        if offset == 0xD04:  # ICSR: PENDSTSET, VECTACTIVE.
-            return (SYSTICK in self.pending) << 26 | (self.active or 0)
+        if offset == 0xD04:
+            return self.icsr()
         if offset == 0xD28:
             return self.cfsr
-        self.expect(offset in self.syst, f"0x{0xE000E000 + offset:08X} was read, which is not modelled")
+        self.expect(offset in self.syst, f"0x{SYSTEM + offset:08X} was read, which is not modelled")
         return self.syst.get(offset, 0)
 
     def write_system(self, block, offset, value):
-        offset += block - 0xE000E000
+        offset += block - SYSTEM
         self.clock.is_asked_to_stop = 1
         self.touch()
         if offset in self.syst:
             self.syst[offset] = value
-            self.tick_ns = self.now_ns + self.tick_span_ns() if self.syst[0x10] & 1 else None
+            self.set_tick(self.now_ns + self.tick_span_ns() if self.syst[0x10] & 1 else None)
         elif offset in (0x100, 0x104):
             self.enabled |= value << 8 * (offset - 0x100)
         elif offset == 0xD08:
@@ -442,4 +436,4 @@ class Machine:
         elif offset == 0xD0C:
             self.reset_requested = value >> 16 == 0x05FA and bool(value & 4)
         else:
-            self.expect(False, f"0x{0xE000E000 + offset:08X} was written, which is not modelled")
+            self.expect(False, f"0x{SYSTEM + offset:08X} was written, which is not modelled")

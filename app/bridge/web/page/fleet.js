@@ -43,7 +43,7 @@ function contradictions(machines) {
   return [...counts].map(([item, count]) => say("fleet_contradicted_on", { item, count, all: machines.length })).join("; ");
 }
 
-function tell(text, kind) {
+function showNews(text, kind) {
   $("news").textContent = text;
   $("news").className = kind;
 }
@@ -57,7 +57,7 @@ function show(fleet, now_ms) {
   $("contradicted").textContent = wrong || STRINGS.fleet_nothing;
   $("contradicted").className = wrong ? "care" : "";
   $("machines").replaceChildren(...machines.map(row));
-  tell(say(old ? "fleet_stale" : "fleet_fresh", { time: when(fleet.wall_us) }), old ? "bad" : "good");
+  showNews(say(old ? "fleet_stale" : "fleet_fresh", { time: when(fleet.wall_us) }), old ? "bad" : "good");
 }
 
 // Address of each machine's own page, if that is configured.
@@ -68,7 +68,7 @@ async function findPages() {
   if (answer.status !== 401) pages.address = (await answer.json()).machine_page;
 }
 
-async function look() {
+async function poll() {
   try {
     if (pages.address === null) await findPages();
     const answer = await askProved("GET", "/api/fleet");
@@ -78,7 +78,7 @@ async function look() {
     if (!answer.ok) throw new Error(body.message);
     show(body, Date.parse(answer.headers.get("Date")));
   } catch (error) {
-    tell(say("fleet_away", { why: error.message }), "bad");
+    showNews(say("fleet_away", { why: error.message }), "bad");
   }
 }
 
@@ -86,7 +86,7 @@ takeToken();
 $("login").addEventListener("submit", (event) => {
   event.preventDefault();
   setToken($("token").value.trim());
-  look();
+  poll();
 });
-look();
-setInterval(() => document.hidden || look(), EVERY_MS);
+poll();
+setInterval(() => document.hidden || poll(), EVERY_MS);

@@ -4,7 +4,7 @@
 
 const $ = (id) => document.getElementById(id);
 const STALE_MS = 1000, ASK_MS = 1000;
-const page = { state: null, heard: 0, gateway: null, stream: null, wait: 500, rights: {}, t_us: 0, frozen: false, recording: null, stop: null, newest: null, delivered: null };
+const page = { state: null, received_ms: 0, gateway: null, stream: null, wait: 500, rights: {}, t_us: 0, frozen: false, recording: null, stop: null, newest: null, delivered: null };
 
 async function ask(method, path, options) {
   const answer = await askProved(method, path, options);
@@ -101,7 +101,7 @@ function takeState(state) {
   page.state = state;
   forgetDelivered(state);
   page.t_us = state.t_us;
-  page.heard = performance.now();
+  page.received_ms = performance.now();
   page.gateway = true;
   const t = state.t_us / 1e6;
   for (const side of ["left", "right"]) {

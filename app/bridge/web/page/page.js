@@ -9,7 +9,7 @@ function setUpWheel(side) {
   const card = $(side), label = (name) => fill(STRINGS[name], { side: STRINGS[side] });
   plots[side] = {
     speed: new Plot(card, STRINGS.speed_plot, label("speed_label"), [
-      { name: "wanted", label: STRINGS.wanted, column: "wanted_mm_s", dash: [2, 4] }, { name: "told", label: STRINGS.told, column: "told_mm_s", dash: [8, 4] },
+      { name: "wanted", label: STRINGS.wanted, column: "commanded_mm_s", dash: [2, 4] }, { name: "applied", label: STRINGS.applied, column: "applied_mm_s", dash: [8, 4] },
       { name: "measured", label: STRINGS.measured, column: "measured_mm_s" }], `${side}-speed`),
     force: new Plot(card, STRINGS.force_plot, label("force_label"), [
       { name: "wanted", label: STRINGS.raw, column: "raw_N", dash: [2, 4], digits: 2, more: true },
@@ -37,12 +37,13 @@ function setUp() {
   $("freeze").addEventListener("click", freeze);
   $("record").addEventListener("click", switchRecord);
   $("live").addEventListener("click", goLive);
-  $("forces").addEventListener("click", showAllForces);
+  $("forces").addEventListener("click", () => showAllForces(!showsAllForces()));
   for (const one of $("spans").children) one.addEventListener("click", () => showSpan(Number(one.dataset.seconds)));
   $("play").addEventListener("click", playOn);
   $("at").addEventListener("input", () => goTo(Number($("at").value)));
   $("pose-clear").addEventListener("click", () => path.clear());
   $("files").addEventListener("change", (event) => openFiles(event.target.files));
+  $("job-end").addEventListener("click", endJob);
   $("login").addEventListener("submit", (event) => {
     event.preventDefault();
     setToken($("token").value.trim());
@@ -58,13 +59,15 @@ function setUp() {
   if (!proof.token) askToken();
   listen();
   setInterval(show, 200);
+  let rest = []; // What is drawn in the next frames, because one frame must not take long.
   const paint = () => {
+    const begun = performance.now();
     // Ten minutes are many points: 20 ms are not visible in them.
-    if (performance.now() - paint.last >= (view.span_s > 60 ? 500 : 50) || view.plots.some((plot) => plot.forced)) {
-      paint.last = performance.now();
-      view.plots.forEach((plot) => plot.draw());
-      path.draw();
+    if (!rest.length && (begun - paint.last >= (view.span_s > 60 ? 500 : 50) || view.plots.some((plot) => plot.forced))) {
+      paint.last = begun;
+      rest = [...view.plots, path];
     }
+    while (rest.length && performance.now() - begun < STEP_MS) rest.shift().draw();
     requestAnimationFrame(paint);
   };
   paint.last = 0;

@@ -96,68 +96,108 @@ function recordingCard(one) {
   const saves = there.map((ending) => {
     const name = `${one.name}.${ending}`;
     const text = ending === "log" ? STRINGS.log_recording : `.${ending}`;
-    return button(text, `${text}: ${saved(name)}`, async () => { const blob = await load(name); if (blob) save(blob, name); }, { "data-ending": ending });
+    return button(text, `${text}: ${saved(name)}`, () => doJob(async (report) => save(await load(name, report), name)), { "data-ending": ending });
   });
-  const csv = button(STRINGS.csv_recording, saved(`${one.name}.csv`), async () => {
-    const recording = decodeRecording(await loadAll(one.name, there));
-    if (recording) save(new Blob([recordingCsv(recording)], { type: "text/csv" }), `${one.name}.csv`);
-  }, { "data-ending": "csv" });
+  const decoded = (ending, text, type, partsOf) => button(text, saved(`${one.name}.${ending}`), () => doJob(async (report) => {
+    const recording = await decodeFiles(one.name, await loadAll(one.name, there, report), report), name = `${one.name}.${ending}`;
+    save(new Blob(await inSteps(partsOf(recording), report("job_writing", name)), { type }), name);
+  }), { "data-ending": ending });
+  const decodes = [decoded("csv", STRINGS.csv_recording, "text/csv", recordingCsv), decoded("mcap", STRINGS.mcap_recording, "application/octet-stream", recordingMcap)];
   const size = one.log_bytes === null ? STRINGS.unknown : `${(one.log_bytes / 1000).toFixed(0)} kB`, cause = STRINGS.recording_causes[one.cause] ?? causeInWords({ cause: one.cause });
   return element("li", {}, element("h3", { text: capital(cause) }), element("p", { class: "quiet", text: fill(STRINGS.recording_facts, { when: when(one.wall_us), size, name: one.name }) }),
-    element("div", { class: "row" }, button(STRINGS.recording_open, fill(STRINGS.recording_open_of, one), () => openRecording(one.name, there)), ...saves, csv));
+    element("div", { class: "row" }, button(STRINGS.recording_open, fill(STRINGS.recording_open_of, one), () => openRecording(one.name, there)), ...saves, ...decodes));
 }
 
-async function load(name) {
+const CANCELLED = new Error(), job = { number: 0 };
+
+// What takes long runs as the one job of the page, which shows its progress and can be cancelled. Another job replaces it.
+// `report(words, name)` returns the function that its steps call with the part that is done.
+async function doJob(work) {
+  endJob();
+  const number = job.number;
+  const report = (words, name) => {
+    const says = say(words, { name });
+    return (share) => {
+      if (number !== job.number) throw CANCELLED;
+      $("job").hidden = false;
+      if ($("job-says").textContent !== says) $("job-says").textContent = says;
+      $("job-done").value = share;
+    };
+  };
   try {
-    const blob = await readRecording(askJson, name, (percent) => { $("recordings-says").textContent = fill(STRINGS.recording_loading, { name, percent }); });
-    $("recordings-says").textContent = "";
-    return blob;
+    await work(report);
+    if (number === job.number) endJob();
   } catch (error) {
-    $("recordings-says").textContent = fill(STRINGS.recordings_unknown, { why: error.message });
-    return null;
+    if (number === job.number) jobFailed(error.message);
   }
 }
 
-// Returns its files as texts. A file that cannot be read is omitted and reported.
-async function loadAll(name, endings) {
+function jobFailed(why) {
+  $("job").hidden = false;
+  $("job-done").hidden = true;
+  $("job-says").textContent = why;
+  $("job-end").textContent = STRINGS.close;
+}
+
+function endJob() {
+  job.number++;
+  $("job").hidden = true;
+  $("job-done").hidden = false;
+  $("job-end").textContent = STRINGS.cancel;
+}
+
+function load(name, report) {
+  return readRecording(askJson, name, report("recording_loading", name));
+}
+
+// Returns its files as texts.
+async function loadAll(name, endings, report) {
   const files = {};
-  for (const ending of endings) {
-    const blob = await load(`${name}.${ending}`);
-    if (blob) files[ending] = await blob.text();
-  }
+  for (const ending of endings) files[ending] = await (await load(`${name}.${ending}`, report)).text();
   return files;
 }
 
-async function openRecording(name, endings) {
-  const files = await loadAll(name, endings);
-  if (endings.every((ending) => ending in files)) showRecording(name, files);
+async function decodeFiles(name, files, report) {
+  const recording = await inSteps(decodeRecording(files), report("job_decoding", name));
+  if (!recording) throw new Error(say("recording_bad", { name: name || STRINGS.unknown }));
+  return recording;
 }
 
-async function openFiles(list) {
-  const files = {};
-  let name = "";
-  for (const file of list) {
-    const found = /^(.*)\.(log|jsonl|conf)$/.exec(file.name);
-    if (found) [name, files[found[2]]] = [found[1], await file.text()];
-  }
-  showRecording(name, files);
+function openRecording(name, endings) {
+  doJob(async (report) => showRecording(name, await decodeFiles(name, await loadAll(name, endings, report), report)));
 }
 
-function showRecording(name, files) {
-  const recording = decodeRecording(files);
-  if (!recording) {
-    $("recordings-says").textContent = fill(STRINGS.recording_bad, { name: name || STRINGS.unknown });
-    return;
-  }
+function openFiles(list) {
+  doJob(async (report) => {
+    const files = {};
+    let name = "";
+    for (const file of list) {
+      const found = /^(.*)\.(log|jsonl|conf)$/.exec(file.name);
+      if (found) [name, files[found[2]]] = [found[1], await file.text()];
+    }
+    showRecording(name, await decodeFiles(name, files, report));
+  });
+}
+
+// Words of an event, as those of the live plots.
+function eventInWords({ type, state, cause, side, refused }) {
+  if (cause) return causeInWords({ cause, side });
+  return STRINGS.states[state] ?? STRINGS.events[refused ? "refused" : type] ?? type;
+}
+
+function showRecording(name, recording) {
+  if (!page.recording) page.forces_before = showsAllForces();
   page.recording = recording;
+  showAllForces(true); // A recording has raw forces only.
   ["left", "right"].forEach((side, i) => {
     plots[side].speed.show(recording.wheels[i].speed);
     plots[side].force.show(recording.wheels[i].force);
   });
-  view.marks = recording.happened.map(({ t, state, cause }) => ({ t, words: cause ? causeInWords({ cause }) : STRINGS.states[state] ?? state, tone: toneOf(state) }));
+  view.marks = [];
+  for (const one of recording.happened) addMark(view.marks, one.t, eventInWords(one), toneOf(one.state ?? one.type));
   Object.assign($("at"), { min: recording.first, max: recording.last, value: 0 });
   $("source").textContent = fill(STRINGS.recording_shown, { name });
-  $("happened").replaceChildren(...recording.happened.slice(-40).map((one) => element("li", { text: `${one.t.toFixed(3)} s: ${one.text}` })));
+  $("happened").replaceChildren(...recording.happened.slice(-40).map((one) => element("li", { text: `${one.t.toFixed(3)} s: ${eventInWords(one)}` })));
   $("player").hidden = false;
   document.body.classList.add("recorded"); // No live figure is shown under its headings.
   goTo(0);
@@ -168,7 +208,7 @@ function goTo(t) {
   const state = page.recording.states.findLast((one) => one.t <= t)?.state;
   $("at").value = t;
   view.at = Number(t);
-  $("at-says").textContent = fill(STRINGS.player_at, { s: Number(t).toFixed(2), state: state ?? STRINGS.unknown });
+  $("at-says").textContent = fill(STRINGS.player_at, { s: Number(t).toFixed(2), state: STRINGS.states[state] ?? state });
   for (const plot of view.plots) plot.showAt();
 }
 
@@ -189,6 +229,7 @@ function playOn() {
 }
 
 function goLive() {
+  if (page.recording) showAllForces(page.forces_before);
   page.recording = null;
   page.frozen = false;
   view.at = view.marks = null;
@@ -209,11 +250,12 @@ function showSpan(seconds) {
   resetView();
 }
 
-function showAllForces() {
-  const all = $("forces").getAttribute("aria-pressed") !== "true";
+function showAllForces(all) {
   $("forces").setAttribute("aria-pressed", String(all));
   for (const side of ["left", "right"]) plots[side].force.showAll(all);
 }
+
+const showsAllForces = () => $("forces").getAttribute("aria-pressed") === "true";
 
 function freeze() {
   page.frozen = !page.frozen;

@@ -3,6 +3,7 @@
 // Series over time by uPlot: they follow the newest seconds, can be moved, zoomed and frozen together, and saved as PNG and CSV.
 
 const KEPT_S = 600; // Time that is stored. The memory is constant for hours.
+const PLOT_PX = 200, LABEL_PX = 14; // Two rows of labels are above the lines.
 
 function colour(name) {
   return getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
@@ -25,13 +26,42 @@ function save(blob, name) {
   setTimeout(() => URL.revokeObjectURL(link.href), 10000);
 }
 
+// A long computation is a generator that yields the part that is done. Between its steps the page handles its events: STOP is never late.
+const STEP_MS = 8;
+
+async function inSteps(work, progress = () => {}) {
+  for (let begun = performance.now(); ;) {
+    const { done, value } = work.next();
+    if (done) return value;
+    if (performance.now() - begun < STEP_MS) continue;
+    progress(value);
+    if (deliver.busy) await new Promise((turn) => setTimeout(turn, 50)); // Until the gateway has answered, STOP needs several turns.
+    await new Promise((turn) => {
+      const { port1, port2 } = new MessageChannel(); // A timer waits longer, above all in a hidden page.
+      port1.onmessage = () => { port1.close(); turn(); };
+      port2.postMessage(0);
+    });
+    begun = performance.now();
+  }
+}
+
+// The first place in ascending times of which the condition is true.
+function firstAt(times, condition) {
+  let low = 0, high = times.length;
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if (condition(times[middle])) high = middle; else low = middle + 1;
+  }
+  return low;
+}
+
 class Series {
   // Columns of numbers (null: unknown), the first of them seconds. Old rows are removed in blocks, so that the cost of a row stays constant.
   constructor(columns) {
     this.data = Array.from({ length: columns }, () => []);
   }
   add(row) {
-    row.forEach((value, i) => this.data[i].push(value));
+    for (let i = 0; i < row.length; i++) this.data[i].push(row[i]);
     const times = this.data[0];
     if (times.length > 64 && times[times.length - 1] - times[0] > KEPT_S * 1.1) {
       const first = this.from(times[times.length - 1] - KEPT_S);
@@ -43,16 +73,28 @@ class Series {
   }
   // The first row that is not before this time.
   from(time) {
-    let low = 0, high = this.data[0].length;
-    while (low < high) {
-      const middle = (low + high) >> 1;
-      if (this.data[0][middle] < time) low = middle + 1; else high = middle;
-    }
-    return low;
+    return firstAt(this.data[0], (one) => one >= time);
   }
-  between(first, last) {
+  // The rows of this time. If they are many more than `pixels`, the lowest and highest value of each half pixel, and the last row.
+  between(first, last, pixels = Infinity) {
     const a = Math.max(0, this.from(first) - 1), b = Math.min(this.data[0].length, this.from(last) + 1);
-    return this.data.map((column) => column.slice(a, b));
+    if (b - a < 8 * pixels) return this.data.map((column) => column.slice(a, b));
+    const [times, ...columns] = this.data, shown = this.data.map(() => []), wide = (last - first) / (2 * pixels);
+    for (let from = a, to; from < b; from = to) {
+      for (to = from + 1; to < b && times[to] < times[from] + wide;) to++;
+      shown[0].push(times[from], times[to - 1]);
+      columns.forEach((column, i) => {
+        let low = from, high = from;
+        for (let n = from + 1; n < to; n++) {
+          if (column[n] === null) continue;
+          if (column[low] === null || column[n] < column[low]) low = n;
+          if (column[high] === null || column[n] > column[high]) high = n;
+        }
+        shown[i + 1].push(column[Math.min(low, high)], column[Math.max(low, high)]);
+      });
+    }
+    shown.forEach((column, i) => column.push(this.data[i][b - 1]));
+    return shown;
   }
 }
 
@@ -82,10 +124,13 @@ function freezeView(frozen) {
   redrawAll();
 }
 
-// One of the same kind and source within a short time is one event.
+// One of the same words within a short time is one event.
+function addMark(marks, t, words, tone) {
+  if (!marks.some((one) => one.words === words && Math.abs(one.t - t) < 0.5)) marks.push({ t, words, tone });
+}
+
 function markLive(t, words, tone) {
-  if (view.live_marks.some((one) => one.words === words && Math.abs(one.t - t) < 0.5)) return;
-  view.live_marks.push({ t, words, tone });
+  addMark(view.live_marks, t, words, tone);
   if (view.live_marks.length > 200) view.live_marks.shift();
   redrawAll();
 }
@@ -124,7 +169,7 @@ class Plot {
     const axis = { stroke: colour("quiet"), grid: { stroke: colour("line"), width: 1 }, ticks: { stroke: colour("line"), width: 1 }, font: "12px system-ui" };
     const seconds = (u, ticks) => ticks.map((tick) => `${Math.round((tick - this.zero()) * 1000) / 1000} s`);
     this.uplot = new uPlot({
-      width: Math.max(this.host.clientWidth, 200), height: 180, legend: { show: false }, padding: [8, 12, 0, 0],
+      width: Math.max(this.host.clientWidth, 200), height: PLOT_PX, legend: { show: false }, padding: [2 * LABEL_PX + 4, 12, 0, 0],
       cursor: { drag: { x: true, y: false, setScale: false }, y: false, sync: { key: "time" } },
       scales: { x: { time: false, range: () => this.window() }, y: { range: () => this.span() } },
       axes: [{ ...axis, splits: (u, i, low, high) => this.ticks(u.width, low, high), values: seconds, size: 30 }, { ...axis, size: 56 }],
@@ -167,7 +212,7 @@ class Plot {
   }
   size() {
     const width = Math.max(this.host.clientWidth, 200);
-    if (width !== this.uplot.width) this.uplot.setSize({ width, height: 180 });
+    if (width !== this.uplot.width) this.uplot.setSize({ width, height: PLOT_PX });
   }
   // The vertical axis is that of all plots of this kind: left and right can be compared.
   span() {
@@ -192,7 +237,7 @@ class Plot {
     if (!this.dirty || (!this.visible && !this.forced) || (view.frozen && this.series === this.live && !this.forced)) return;
     this.dirty = this.forced = false;
     const [first, last] = this.window();
-    const columns = this.series.between(first, last);
+    const columns = this.series.between(first, last, this.uplot.width);
     this.measure(columns);
     this.uplot.setData(columns, false);
     this.uplot.setScale("x", { min: first, max: last });
@@ -207,34 +252,42 @@ class Plot {
   }
   // Values at the mouse; otherwise at the time of the recording; otherwise the newest.
   showValues() {
-    const index = view.at === null ? this.uplot.cursor.idx ?? this.uplot.data[0].length - 1 : Math.max(0, this.indexAt(view.at));
+    const data = view.at === null ? this.uplot.data : this.series.data;
+    const index = view.at === null ? this.uplot.cursor.idx ?? data[0].length - 1 : Math.max(0, firstAt(data[0], (time) => time > view.at) - 1);
     this.values.forEach((place, n) => {
-      const value = this.uplot.data[n + 1]?.[index] ?? null, words = value === null ? "–" : plain(value.toFixed(this.lines[n].digits ?? 0));
+      const value = data[n + 1]?.[index] ?? null, words = value === null ? "–" : plain(value.toFixed(this.lines[n].digits ?? 0));
       if (place.textContent !== words) place.textContent = words;
     });
   }
-  indexAt(t) {
-    return this.uplot.data[0].findLastIndex((time) => time <= t);
-  }
-  // Events as vertical lines. Of lines close together only the first has its text.
+  // Events as vertical lines. A label is right or left of its line, in the first row in which it touches no other; serious events come first.
   drawMarks(u) {
-    const { ctx } = u, { left, top, width, height } = u.bbox, ratio = devicePixelRatio;
-    const marks = this.series === this.live ? view.live_marks : view.marks ?? [];
-    let free = left;
+    const { ctx } = u, { left, width } = u.bbox, ratio = devicePixelRatio, row = LABEL_PX * ratio, top = u.bbox.top - 2 * row, labels = [];
+    const marks = (this.series === this.live ? view.live_marks : view.marks ?? []).filter((one) => one.t >= u.scales.x.min && one.t <= u.scales.x.max);
+    const placed = marks.map((one) => ({ ...one, x: u.valToPos(one.t, "x", true) }));
     ctx.save();
     ctx.font = `${11 * ratio}px system-ui`;
+    ctx.textAlign = "left";
+    ctx.textBaseline = "middle";
     ctx.lineWidth = ratio;
-    for (const { t, words, tone } of marks.filter((one) => one.t >= u.scales.x.min && one.t <= u.scales.x.max)) {
-      const x = u.valToPos(t, "x", true), wide = ctx.measureText(words).width;
+    for (const { x, tone } of placed) {
       ctx.strokeStyle = colour(tone);
       ctx.beginPath();
       ctx.moveTo(x, top);
-      ctx.lineTo(x, top + height);
+      ctx.lineTo(x, u.bbox.top + u.bbox.height);
       ctx.stroke();
-      if (x < free || x + wide > left + width) continue;
+    }
+    const rank = { bad: 0, care: 1 };
+    for (const { words, tone, x } of placed.sort((a, b) => (rank[a.tone] ?? 2) - (rank[b.tone] ?? 2))) {
+      const wide = ctx.measureText(words).width + 6 * ratio;
+      const places = [0, 1].flatMap((n) => [[x + ratio, n], [x - ratio - wide, n]]);
+      const place = places.find(([at, n]) => at >= left && at + wide <= left + width && labels.every((one) => one.n !== n || at >= one.to || at + wide <= one.at));
+      if (!place) continue;
+      const [at, n] = place;
+      labels.push({ at, to: at + wide, n });
+      ctx.fillStyle = colour("card");
+      ctx.fillRect(at, top + n * row, wide, row);
       ctx.fillStyle = colour("ink");
-      ctx.fillText(words, x + 3 * ratio, top + 10 * ratio);
-      free = x + wide + 12 * ratio;
+      ctx.fillText(words, at + 3 * ratio, top + (n + 0.5) * row);
     }
     ctx.restore();
   }
@@ -289,23 +342,24 @@ class Plot {
     context.drawImage(from, 0, 0);
     to.toBlob((blob) => save(blob, `${this.file}.png`));
   }
-  csv() {
-    const [first, last] = this.window();
-    const rows = this.series.between(first, last);
-    const lines = [["t_s", ...this.lines.map((line) => line.column)].join(",")];
-    rows[0].forEach((_, i) => lines.push(rows.map((column) => column[i] ?? "").join(",")));
-    return lines.join("\n") + "\n";
+  * csv() {
+    const rows = this.series.between(...this.window()), parts = [["t_s", ...this.lines.map((line) => line.column)].join(",") + "\n"];
+    for (let i = 0; i < rows[0].length; i += 64) {
+      parts.push(rows[0].slice(i, i + 64).map((_, n) => rows.map((column) => column[i + n] ?? "").join(",") + "\n").join(""));
+      yield;
+    }
+    return parts;
   }
-  saveCsv() {
-    save(new Blob([this.csv()], { type: "text/csv" }), `${this.file}.csv`);
+  async saveCsv() {
+    save(new Blob(await inSteps(this.csv()), { type: "text/csv" }), `${this.file}.csv`);
   }
 }
 
 // Margin above and below. Small noise does not fill the whole height.
 function spread(low, high) {
   if (!Number.isFinite(low) || !Number.isFinite(high)) return [-1, 1];
-  const room = Math.max((high - low) * 0.1, 1);
-  return [low - room, high + room];
+  const margin = Math.max((high - low) * 0.1, 1);
+  return [low - margin, high + margin];
 }
 
 class Path {
@@ -369,7 +423,7 @@ class Path {
     context.save();
     context.translate(x, y);
     context.rotate(angle);
-    context.fillStyle = colour("told");
+    context.fillStyle = colour("applied");
     context.beginPath();
     context.moveTo(0, -11);
     context.lineTo(7, 8);

@@ -2,6 +2,7 @@
 "use strict";
 // Recordings: read in pieces with their checksums, decoded (docs/developer/protocol.md), and the frames around a stop on a time axis.
 
+const OLD_S = 0.5; // A speed without a frame for this time is unknown, as in `iwheelctl export`.
 const SETPOINTS = { 266: 0, 298: 1 }, SPEEDS = { 256: 0, 288: 1 }, FORCES = { 512: 0, 544: 1 };
 
 const CRC = Uint32Array.from({ length: 256 }, (_, n) => {
@@ -26,7 +27,7 @@ async function readRecording(ask, name, progress) {
     offset += bytes.length;
     if (crc32(bytes) !== piece.crc32 || (piece.file_crc32 !== null && piece.file_crc32 !== crc)) throw new Error(say("recording_broken", { name }));
     pieces.push(bytes);
-    progress(piece.size ? Math.round((100 * offset) / piece.size) : 100);
+    progress(piece.size ? offset / piece.size : 1);
     if (offset >= piece.size) return new Blob(pieces);
     if (!bytes.length) throw new Error(say("recording_broken", { name }));
   }
@@ -51,71 +52,107 @@ function parseConf(text) {
 }
 
 // candump's log form: (seconds) interface ID#DATA [R|T]
-function parseLog(text) {
-  const frames = [];
-  for (const line of text.split("\n")) {
-    const found = /^\((\d+)\.(\d{6})\) \S+ ([0-9A-F]{3})#([0-9A-Fa-f]*)( [RT])?/.exec(line);
-    if (found) {
-      const data = found[4].match(/../g)?.map((byte) => parseInt(byte, 16)) ?? [];
-      frames.push({ t_us: Number(found[1]) * 1e6 + Number(found[2]), id: parseInt(found[3], 16), data, own: found[5] === " T" });
-    }
+const FRAME = /^\((\d+)\.(\d{6})\) \S+ ([0-9A-F]{3})#([0-9A-Fa-f]*)/m;
+const frameTime = (found) => Number(found[1]) * 1e6 + Number(found[2]);
+const byTime = (a, b) => a[0] - b[0];
+
+// The last frame of a log whose last lines may be incomplete.
+function lastFrame(log) {
+  for (let end = log.length, at; end > 0; end = at - 1) {
+    at = log.lastIndexOf("\n", end - 1) + 1;
+    const found = FRAME.exec(log.slice(at, end));
+    if (found) return found;
   }
-  return frames;
 }
 
-function signed16(data, at) {
-  const value = (data[at] << 8) | data[at + 1];
+// The signed value of two bytes.
+function signed16(hex, at) {
+  const value = parseInt(hex.slice(2 * at, 2 * at + 4), 16);
   return value >= 0x8000 ? value - 0x10000 : value;
 }
 
-// Series in seconds from the stop, and the events of the .jsonl. null if there are no frames.
-function decodeRecording(files) {
-  const frames = parseLog(files.log ?? ""), conf = parseConf(files.conf ?? "");
-  const told = (files.jsonl ?? "").split("\n").flatMap((line) => { try { return [JSON.parse(line)]; } catch { return []; } });
-  const head = told.find((one) => one.type === "blackbox"), why = told.find((one) => one.type === "why");
-  if (!frames.length) return null;
-  // The log may have wall time, as candump's. The black box contains the difference of the two clocks.
-  const wall = frames[0].t_us > 1e15 ? head?.wall_minus_monotonic_us ?? 0 : 0;
-  const stop_us = (why?.at_us ?? frames.at(-1).t_us - wall) + wall;
-  const per_rpm = (2 * Math.PI * conf.radius_mm) / 60 / (conf.rotor ? conf.gear : 1);
-  const wheels = [0, 1].map(() => ({ speed: new Series(4), force: new Series(4), wanted: null, told: null, measured: null }));
-  const seconds = (t_us) => (t_us - stop_us) / 1e6;
-  const asked = told.filter((one) => one.type === "drive" || one.type === "state").map((one) => ({ ...one, t: seconds(one.t_us + wall) }));
-  let next = 0;
-  for (const { t_us, id, data } of frames) {
-    const t = seconds(t_us), side = SETPOINTS[id] ?? SPEEDS[id] ?? FORCES[id];
-    for (; next < asked.length && asked[next].t <= t; next++) take(wheels, asked[next]);
-    if (side === undefined || data.length < 2) continue;
-    const wheel = wheels[side], sign = conf.invert[side];
-    if (id in FORCES) {
-      wheel.force.add([t, signed16(data, 0) * conf.newton[side], null, null]);
-      continue;
-    }
-    if (id in SETPOINTS && data.length >= 3) wheel.told = signed16(data, 1) * sign;
-    if (id in SPEEDS) wheel.measured = signed16(data, 0) * per_rpm * sign;
-    wheel.speed.add([t, wheel.wanted, wheel.told, wheel.measured]);
+// Passes each line to `use`.
+function* eachLine(text, use) {
+  for (let at = 0, n = 1, end; at < text.length; at = end + 1, n++) {
+    end = text.indexOf("\n", at);
+    if (end < 0) end = text.length;
+    use(text.slice(at, end));
+    if (n % 64 === 0) yield at / text.length;
   }
-  const happened = told.filter((one) => one.t_us !== undefined && ((one.type === "state" && one.state !== one.before) || ["arm", "stopped", "died"].includes(one.type)))
-    .map((one) => ({ t: seconds(one.t_us + wall), text: [one.type, one.state, one.cause].filter(Boolean).join(" "), state: one.state ?? one.type, cause: one.cause }));
-  return { wheels, happened, why, states: asked.filter((one) => one.type === "state"), first: seconds(frames[0].t_us), last: seconds(frames.at(-1).t_us) };
 }
 
-// One line for each value that changed, in the order of time.
-function recordingCsv({ wheels }) {
-  const lines = [];
-  ["left", "right"].forEach((side, i) => {
-    const { speed, force } = wheels[i], cell = (value) => (value === null ? "" : Number(value.toFixed(3)));
-    speed.data[0].forEach((t, n) => lines.push([t, side, ...speed.data.slice(1).map((column) => cell(column[n])), ""]));
-    force.data[0].forEach((t, n) => lines.push([t, side, "", "", "", cell(force.data[1][n])]));
+// Series in seconds from the stop, and the events of the .jsonl. null if there are no frames.
+function* decodeRecording({ log = "", jsonl = "", conf = "" }) {
+  const lines = [], values = parseConf(conf);
+  yield* eachLine(jsonl, (line) => { try { lines.push(JSON.parse(line)); } catch { /* An incomplete line. */ } });
+  const head = lines.find((one) => one.type === "blackbox"), why = lines.find((one) => one.type === "why"), begin = FRAME.exec(log);
+  if (!begin) return null;
+  // The log may have wall time, as candump's. The black box contains the difference of the two clocks.
+  const wall = frameTime(begin) > 1e15 ? head?.wall_minus_monotonic_us ?? 0 : 0;
+  const stop_us = (why?.at_us ?? frameTime(lastFrame(log)) - wall) + wall;
+  const per_rpm = (2 * Math.PI * values.radius_mm) / 60 / (values.rotor ? values.gear : 1);
+  const wheels = [0, 1].map(() => ({ speed: new Series(4), force: new Series(4), commanded: null, applied: null, measured: null, applied_t: 0, measured_t: 0 }));
+  const seconds = (t_us) => (t_us - stop_us) / 1e6;
+  const asked = lines.filter((one) => one.type === "drive" || one.type === "state").map((one) => ({ ...one, t: seconds(one.t_us + wall) }));
+  let next = 0, last = 0;
+  yield* eachLine(log, (line) => {
+    const found = FRAME.exec(line);
+    if (!found) return;
+    const t = last = seconds(frameTime(found)), id = parseInt(found[3], 16), hex = found[4], side = SETPOINTS[id] ?? SPEEDS[id] ?? FORCES[id];
+    for (; next < asked.length && asked[next].t <= t; next++) setCommand(wheels, asked[next]);
+    if (side === undefined || hex.length < 4) return;
+    const wheel = wheels[side], sign = values.invert[side];
+    if (id in FORCES) {
+      wheel.force.add([t, signed16(hex, 0) * values.newton[side], null, null]);
+      return;
+    }
+    if (id in SETPOINTS && hex.length >= 6) Object.assign(wheel, { applied: signed16(hex, 1) * sign, applied_t: t });
+    if (id in SPEEDS) Object.assign(wheel, { measured: signed16(hex, 0) * per_rpm * sign, measured_t: t });
+    if (t - wheel.applied_t > OLD_S) wheel.applied = null;
+    if (t - wheel.measured_t > OLD_S) wheel.measured = null;
+    wheel.speed.add([t, wheel.commanded, wheel.applied, wheel.measured]);
   });
-  lines.sort((a, b) => a[0] - b[0]);
-  return ["t_s,wheel,requested_mm_s,commanded_mm_s,measured_mm_s,force_raw_N", ...lines.map(([t, ...rest]) => [t.toFixed(6), ...rest].join(","))].join("\n") + "\n";
+  const happened = lines.filter((one) => one.t_us !== undefined && ((one.type === "state" && one.state !== one.before) || ["arm", "stopped", "died"].includes(one.type)))
+    .map((one) => ({ ...one, t: seconds(one.t_us + wall) }));
+  return { wheels, happened, why, stop_us, states: asked.filter((one) => one.type === "state"), first: seconds(frameTime(begin)), last };
+}
+
+// Each value that changed: seconds, wheel, commanded, applied, measured, force.
+function* rowsOf({ wheels }) {
+  for (const i of [0, 1]) {
+    const [times, ...values] = wheels[i].speed.data, [force_times, forces] = wheels[i].force.data;
+    for (let n = 0; n < times.length; n++) yield [times[n], i, values[0][n], values[1][n], values[2][n], null];
+    for (let n = 0; n < forces.length; n++) yield [force_times[n], i, null, null, null, forces[n]];
+  }
+}
+
+// Returns the rows of each second, because sorting all of them is too long for one step. The caller sorts them by time.
+function* bySecond(rows) {
+  const seconds = new Map();
+  let n = 0;
+  for (const row of rows) {
+    const second = Math.floor(row[0]), found = seconds.get(second);
+    if (found) found.push(row); else seconds.set(second, [row]);
+    if (++n % 256 === 0) yield 0;
+  }
+  return [...seconds].sort(byTime).map((one) => one[1]);
+}
+
+// Returns the parts of the file: one line for each value that changed, in the order of time.
+function* recordingCsv(recording) {
+  const parts = ["t_s,wheel,commanded_mm_s,applied_mm_s,measured_mm_s,force_raw_N\n"], cell = (value) => (value === null ? "" : Number(value.toFixed(3)));
+  const seconds = yield* bySecond(rowsOf(recording));
+  for (const rows of seconds) {
+    parts.push(rows.sort(byTime).map(([t, i, ...values]) => `${t.toFixed(6)},${i ? "right" : "left"},${values.map(cell).join(",")}\n`).join(""));
+    yield parts.length / seconds.length;
+  }
+  return parts;
 }
 
 // Sets the command of the client from this time on, while it may drive.
-function take(wheels, one) {
-  if (one.type === "drive" && one.refused === null) [wheels[0].wanted, wheels[1].wanted] = [one.left_mm_s, one.right_mm_s];
-  if (one.type === "state" && one.state !== "armed") wheels[0].wanted = wheels[1].wanted = null;
+function setCommand(wheels, one) {
+  if (one.type === "drive" && one.refused === null) [wheels[0].commanded, wheels[1].commanded] = [one.left_mm_s, one.right_mm_s];
+  if (one.type === "state" && one.state !== "armed") wheels[0].commanded = wheels[1].commanded = null;
 }
 
 const IDS = { 256: "left speed", 288: "right speed", 257: "left status", 289: "right status", 290: "pose", 512: "left force", 544: "right force",

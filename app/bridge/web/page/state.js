@@ -2,23 +2,23 @@
 "use strict";
 // Shows the state of the machine in words and figures.
 
-function cureOf(state, cause) {
-  const heard = state.left.heard && state.right.heard;
-  if (cause === "send_stalled" && heard && !state.bus.name.startsWith("unix:")) return fill(STRINGS.next.echo, { bus: state.bus.name });
-  return STRINGS.cures[cause] ?? null;
+function fixOf(state, cause) {
+  const online = state.left.heard && state.right.heard;
+  if (cause === "send_stalled" && online && !state.bus.name.startsWith("unix:")) return fill(STRINGS.next.echo, { bus: state.bus.name });
+  return STRINGS.fixes[cause] ?? null;
 }
 
 function presentAdvice(state) {
-  return state.present.filter((cause) => cause !== state.cause).map((cause) => `${cause}: ${cureOf(state, cause) ?? STRINGS.next.see}`);
+  return state.present.filter((cause) => cause !== state.cause).map((cause) => `${cause}: ${fixOf(state, cause) ?? STRINGS.next.see}`);
 }
 
 // The same lines as `iwheelctl status`.
 function advise(state) {
-  const next = STRINGS.next, cure = state.cause ? cureOf(state, state.cause) : null;
+  const next = STRINGS.next, fix = state.cause ? fixOf(state, state.cause) : null;
   if (state.state === "armed") return [next.armed];
   if (state.state === "stopping" && state.holding) return [next.holding];
-  if (state.state === "stopping") return [cure ?? next.stopping];
-  if (state.state === "latched") return [fill(next.latched, { cure: cure ?? next.remove }), ...presentAdvice(state)].slice(0, 6);
+  if (state.state === "stopping") return [fix ?? next.stopping];
+  if (state.state === "latched") return [fill(next.latched, { fix: fix ?? next.remove }), ...presentAdvice(state)].slice(0, 6);
   if (state.state !== "listening") return [next.newer];
   const lines = presentAdvice(state);
   if (state.listen_only) return [...lines, next.listen_only].slice(0, 6);
@@ -52,10 +52,10 @@ function number(value, unit) {
 }
 
 const figures = [
-  ["heard", (w) => (w.heard ? (w.at_rest ? STRINGS.at_rest : STRINGS.turning) : STRINGS.not_heard)],
+  ["telemetry", (w) => (w.heard ? (w.at_rest ? STRINGS.at_rest : STRINGS.turning) : STRINGS.not_heard)],
   ["measured", (w) => number(w.speed_mm_s, "mm/s")],
   ["wanted", (w) => number(w.commanded_mm_s, "mm/s")],
-  ["told", (w) => number(w.applied_mm_s, "mm/s")],
+  ["applied", (w) => number(w.applied_mm_s, "mm/s")],
   ["current", (w) => number(w.applied_mA, "mA")],
   ["net", (w) => decimal(w.force_net_mN, 3, "N")],
   ["offset", (w) => decimal(w.force_offset_mN, 3, "N")],
@@ -69,10 +69,10 @@ const figures = [
 ];
 
 function showWheel(side, wheel) {
-  for (const [name, read] of figures) text(`${side}-${name}`, wheel ? read(wheel) : null, name === "heard" && wheel && !wheel.heard ? "bad" : "");
+  for (const [name, read] of figures) text(`${side}-${name}`, wheel ? read(wheel) : null, name === "telemetry" && wheel && !wheel.heard ? "bad" : "");
 }
 
-const toneOf = (state) => ({ latched: "bad", stopping: "care", stopped: "care", died: "bad" })[state] ?? "accent";
+const toneOf = (state) => ({ latched: "bad", stopping: "care", stopped: "bad", died: "bad" })[state] ?? "accent";
 
 const capital = (words) => words.charAt(0).toUpperCase() + words.slice(1);
 
@@ -80,15 +80,15 @@ const capital = (words) => words.charAt(0).toUpperCase() + words.slice(1);
 function inOneWord(state) {
   const { word, here, next } = STRINGS, lines = advise(state), first = lines[0];
   if (state.state === "latched") {
-    const cure = cureOf(state, state.cause) ?? next.remove;
-    return [word.latched, "bad", fill(page.rights.may_reset ? here.latched : next.latched, { cure })];
+    const fix = fixOf(state, state.cause) ?? next.remove;
+    return [word.latched, "bad", fill(page.rights.may_reset ? here.latched : next.latched, { fix })];
   }
   if (state.arming) return [word.arming, "busy", next.armed];
   if (state.state === "armed") return [word.armed, "busy", drive.held ? here.armed_here : fill(here.armed, { name: state.lease.name })];
   if (state.state === "stopping") return [state.holding ? word.holding : word.stopping, "care", first];
   if (first === next.ready) return [word.ready, "good", page.rights.may_drive ? here.ready_drive : here.ready];
   const [present] = state.present;
-  if (present) return [word.not_ready, "care", `${causeInWords({ cause: present })}: ${cureOf(state, present) ?? next.see}`];
+  if (present) return [word.not_ready, "care", `${causeInWords({ cause: present })}: ${fixOf(state, present) ?? next.see}`];
   return state.listen_only && first === next.listen_only ? [word.watching, "care", first] : [word.not_ready, "care", first];
 }
 
@@ -183,7 +183,7 @@ function showTables(state) {
 }
 
 function showNews() {
-  const silent = performance.now() - page.heard, known = page.state !== null;
+  const silent = performance.now() - page.received_ms, known = page.state !== null;
   if (page.gateway === null || !page.stream) text("news", STRINGS.news_bridge, "bad");
   else if (!page.gateway) text("news", STRINGS.news_away, "bad");
   else if (!known || silent > STALE_MS) text("news", fill(STRINGS.news_none, { s: known ? (silent / 1000).toFixed(0) : "?" }), "bad");

@@ -28,7 +28,7 @@ async function deliver(name) {
   if (deliver.busy) return;
   deliver.busy = true;
   let times = 0, why = "";
-  tell(STRINGS.stopping_now);
+  showResult(STRINGS.stopping_now);
   for (;;) {
     times++;
     const asked = deliver.verb;
@@ -37,7 +37,7 @@ async function deliver(name) {
       const answer = await (asked === "stop" ? askStop(options) : ask("POST", "/api/estop", options));
       const body = await answer.json();
       if (answer.ok) {
-        tell(fill(STRINGS.delivered, { state: STRINGS.states[body.state] ?? body.state }), "good");
+        showResult(fill(STRINGS.delivered, { state: STRINGS.states[body.state] ?? body.state }), "good");
         page.delivered = { state: body.state, seen: false, ms: performance.now() };
         if (asked === deliver.verb) break;
         continue;
@@ -59,10 +59,10 @@ function forgetDelivered(state) {
   const said = page.delivered;
   if (!said) return;
   if (state.state === said.state) said.seen = true;
-  else if (said.seen || performance.now() - said.ms > 1000) tell("");
+  else if (said.seen || performance.now() - said.ms > 1000) showResult("");
 }
 
-function tell(words, tone = "") {
+function showResult(words, tone = "") {
   page.delivered = null;
   $("delivered").className = tone;
   $("delivered").textContent = words;
@@ -89,7 +89,7 @@ function makeRoomForStop() {
 function setUpStop() {
   const press = () => { letGo("why_let_go"); deliver("stop"); $("ask").close(); };
   $("stop").addEventListener("pointerdown", press); // On touch, not when the finger is lifted.
-  $("stop").addEventListener("click", (event) => { if (event.detail === 0) press(); }); // By Enter, or by a screen reader.
+  $("stop").addEventListener("click", (event) => { if (event.detail === 0) press(); }); // Enter, or a screen reader.
   $("estop-ask").addEventListener("click", async () => { if (await confirmed(STRINGS.ask_estop, STRINGS.ask_estop_yes)) deliver("estop"); });
   $("reset").addEventListener("click", async () => {
     const stop = page.stop; // The stop that the person sees: a later one is not cleared.
@@ -110,13 +110,13 @@ async function reset(stop) {
   try {
     const query = new URLSearchParams({ boot: await bootOf(), t_us: page.t_us, stop });
     const body = await (await ask("POST", `/api/reset?${query}`, { signal: AbortSignal.timeout(ASK_MS) })).json();
-    tell(body.ok ? "" : fill(STRINGS.refused, { why: body.message }));
+    showResult(body.ok ? "" : fill(STRINGS.refused, { why: body.message }));
   } catch {
-    tell(fill(STRINGS.refused, { why: STRINGS.no_answer }));
+    showResult(fill(STRINGS.refused, { why: STRINGS.no_answer }));
   }
 }
 
 function notDelivered(why, times) {
-  tell(STRINGS.not_delivered, "bad");
+  showResult(STRINGS.not_delivered, "bad");
   $("delivered").append(element("small", { text: fill(STRINGS.not_delivered_why, { why, times }) }));
 }

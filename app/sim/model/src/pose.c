@@ -4,7 +4,7 @@
 #include "iwheel_sim/trig.h"
 
 void sim_pose_restart(sim_pose_t *self, iw_time_us_t now_us, int64_t right_nm) {
-    sim_pose_t fresh = {.now_us = now_us, .left_heard_us = now_us, .right_last_nm = right_nm};
+    sim_pose_t fresh = {.now_us = now_us, .left_received_us = now_us, .right_last_nm = right_nm};
     fresh.track_mm = self->track_mm;
     fresh.mirrored[IW_LEFT] = self->mirrored[IW_LEFT];
     fresh.mirrored[IW_RIGHT] = self->mirrored[IW_RIGHT];
@@ -12,7 +12,7 @@ void sim_pose_restart(sim_pose_t *self, iw_time_us_t now_us, int64_t right_nm) {
 }
 
 static void follow_left(sim_pose_t *self, iw_time_us_t now_us) {
-    iw_time_us_t const silent_us = self->left_heard_us + SIM_POSE_SILENT_US;
+    iw_time_us_t const silent_us = self->left_received_us + SIM_POSE_SILENT_US;
     iw_time_us_t const end_us = (now_us < silent_us) ? now_us : silent_us;
     if (end_us > self->now_us) {
         self->left_nm += (int64_t)self->left_um_s * (int64_t)(end_us - self->now_us) / 1000;
@@ -22,7 +22,7 @@ static void follow_left(sim_pose_t *self, iw_time_us_t now_us) {
 
 void sim_pose_receive_left(sim_pose_t *self, iw_time_us_t now_us, int32_t speed_um_s) {
     follow_left(self, now_us);
-    self->left_heard_us = now_us;
+    self->left_received_us = now_us;
     self->left_um_s = speed_um_s;
 }
 

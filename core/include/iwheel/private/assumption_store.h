@@ -44,9 +44,6 @@ static inline iw_assumption_item_t iw_assumption_force_unit(iw_side_t side) {
 /// Returns true if a contradiction of this item prevents motion: setpoint type, current role and the signs.
 bool iw_assumption_guards_motion(iw_assumption_item_t item);
 
-/// Returns the present entry of an item.
-const iw_assumption_entry_t *iw_assumption_entry(const iw_assumption_store_t *self, iw_assumption_item_t item);
-
 #ifdef __cplusplus
 }
 #endif

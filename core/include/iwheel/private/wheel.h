@@ -25,6 +25,7 @@ extern "C" {
 
 /// After this time without a frame the core assumes that the wheel had no power.
 #define IW_WHEEL_REBOOT_SILENCE_US 1000000U
+#define IW_WHEEL_SPEED_PERIOD_US   4000U ///< Period of speed messages (document).
 /// Period of offset messages (document).
 #define IW_WHEEL_OFFSET_PERIOD_US 1000000U
 #define IW_WHEEL_OFFSET_LEARN_US  2000000U ///< Time in which a wheel measures its offset before the first message.

@@ -86,9 +86,9 @@ IWC_API const char *iwc_words(iwc_result_t result);
 
 /// Finds the socket that is used if the caller names none: $IWHEEL_SOCKET, otherwise the *.sock of the only gateway in
 /// `directory`. NULL means IWC_DIRECTORY; only then the function reads the environment. It prefers the drive socket,
-/// and finds the watch socket if this user may not use the drive socket. Returns IWC_OK with the path in `out`;
-/// IWC_SEVERAL with all paths, separated by blanks, as far as they fit; IWC_DENIED or IWC_NOT_THERE with an empty text;
-/// IWC_INVALID if $IWHEEL_SOCKET does not fit.
+/// and finds the watch socket if this user may not use the drive socket. Of several sockets only those count on which a
+/// program listens. Returns IWC_OK with the path in `out`; IWC_SEVERAL with all paths, separated by blanks, as far as
+/// they fit; IWC_DENIED or IWC_NOT_THERE with an empty text; IWC_INVALID if $IWHEEL_SOCKET does not fit.
 IWC_API iwc_result_t iwc_find(const char *directory, char *out, size_t size);
 
 /// Closes an open connection, connects to `path` (NULL: the result of `iwc_find`) and waits for the gateway's greeting.
@@ -100,6 +100,11 @@ IWC_API iwc_result_t iwc_connect(iwc_t *self, const char *path, int timeout_ms);
 /// Uses a connected stream socket instead, which the handle then owns and closes. Otherwise like `iwc_connect` from the
 /// greeting on.
 IWC_API iwc_result_t iwc_adopt(iwc_t *self, int fd, int timeout_ms);
+
+/// Like `iwc_adopt`, but does not wait for the greeting. In the places that the gateway keeps for stops it sends none and
+/// executes stops only. A greeting or a refusal (too many clients) is a message of `iwc_next`. Returns IWC_OK or
+/// IWC_INVALID.
+IWC_API iwc_result_t iwc_adopt_for_stop(iwc_t *self, int fd);
 
 /// Ends the connection, and with it the lease. Discards messages that were not read.
 IWC_API void iwc_close(iwc_t *self);
@@ -367,8 +372,9 @@ IWC_API iwc_result_t iwc_twist_as(iwc_t *self, const iwc_twist_t *command, const
 /// lease. Results as in `iwc_ask`.
 IWC_API iwc_result_t iwc_stop(iwc_t *self, int timeout_ms);
 
-/// Stops the wheels without a ramp, latched until `iwc_reset`; otherwise like `iwc_stop`. `reason`: up to 200 bytes, no
-/// control characters; NULL: none. It does not replace the button that cuts power.
+/// Stops the wheels without a ramp, latched until `iwc_reset`; otherwise like `iwc_stop`. `reason`: a text in UTF-8; NULL:
+/// none. It is cut after 200 bytes, and each byte of a character that is not allowed becomes a space; no reason prevents
+/// the stop. It does not replace the button that cuts power.
 IWC_API iwc_result_t iwc_estop(iwc_t *self, const char *reason, int timeout_ms);
 
 /// Stops the wheels with the ramp, through a connection of its own: it closes the connection of `self` before, and the
@@ -377,6 +383,9 @@ IWC_API iwc_result_t iwc_estop(iwc_t *self, const char *reason, int timeout_ms);
 /// accepts no connection or has no place, the call tries the gateway's other socket, which is watch/NAME.sock for
 /// NAME.sock, and then both again until the time is over. Results as in `iwc_ask`, and those of `iwc_connect` for
 /// `path`.
+///
+/// If `path` is NULL and several gateways run, the call stops all of them. It returns IWC_OK if at least one executed the
+/// stop; `iwc_reply` then has a reply only if the gateway that was called last sent one.
 IWC_API iwc_result_t iwc_stop_at(iwc_t *self, const char *path, int timeout_ms);
 
 /// Like `iwc_stop_at`, without a ramp and latched; `reason` as in `iwc_estop`.

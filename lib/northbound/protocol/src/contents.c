@@ -34,9 +34,9 @@ static void write_motion(const iw_snapshot_t *seen, iw_side_t side, iwn_out_t *j
     } else {
         iwn_out_null(json, "at_rest");
     }
-    iwn_out_known32(json, "speed_rpm", online, wheel->told->speed.speed_rpm);
+    iwn_out_known32(json, "speed_rpm", online, wheel->telemetry->speed.speed_rpm);
     iwn_out_known32(json, "speed_mm_s", online && iwn_is_speed_known(seen), wheel->speed_mm_s);
-    iwn_out_known32(json, "acceleration_raw", online, wheel->told->speed.acceleration_raw);
+    iwn_out_known32(json, "acceleration_raw", online, wheel->telemetry->speed.acceleration_raw);
     iwn_out_known32(json, "commanded_mm_s", following, wanted.speed_mm_s);
     iwn_out_known32(json, "commanded_mA", following, wanted.current_mA);
     iwn_out_known32(json, "applied_mm_s", sending, applied.speed_mm_s);
@@ -44,7 +44,7 @@ static void write_motion(const iw_snapshot_t *seen, iw_side_t side, iwn_out_t *j
     iwn_write_age("speed_age_ms", seen->at_us, wheel->speed_us, json);
 }
 
-/// A controller has no instruction for this division, and its library's for signed numbers is large.
+/// Divides without sign: a microcontroller has no 64-bit division, and the signed one of its library is large.
 static int64_t mm_of_nm(int64_t nm) {
     const uint64_t mm = ((nm < 0) ? 0U - (uint64_t)nm : (uint64_t)nm) / 1000000U;
     return (nm < 0) ? -(int64_t)mm : (int64_t)mm;
@@ -52,7 +52,7 @@ static int64_t mm_of_nm(int64_t nm) {
 
 static void write_condition(const iw_snapshot_t *seen, iw_side_t side, iwn_out_t *json) {
     const iw_snapshot_wheel_t *wheel = &seen->wheel[side];
-    const iw_codec_status_t *status = &wheel->told->status;
+    const iw_codec_status_t *status = &wheel->telemetry->status;
     const iw_force_validity_t force = iw_snapshot_force_validity(seen, side);
     const bool ever = wheel->status_us != IW_NEVER;
     const bool fresh = is_fresh(seen->at_us, wheel->status_us);
@@ -91,7 +91,7 @@ static bool at_limit(int16_t value) {
 }
 
 static void write_pose(const iw_snapshot_t *seen, iwn_out_t *json) {
-    const iw_codec_pose_t *pose = &seen->wheel[IW_RIGHT].told->pose;
+    const iw_codec_pose_t *pose = &seen->wheel[IW_RIGHT].telemetry->pose;
     const bool fresh = is_fresh(seen->at_us, seen->pose_us) && !contradicted(seen, IW_ASSUMPTION_POSE_BYTE_ORDER);
     iwn_out_open(json, "pose", '{');
     iwn_out_known32(json, "x_mm", fresh, pose->x_mm);

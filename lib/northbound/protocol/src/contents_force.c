@@ -98,7 +98,7 @@ void iwn_write_wheel_force(const iw_snapshot_t *seen, const iwn_surroundings_t *
     iwn_out_known(json, &"offset_deviation_mN"[zero_prefix], zero.measured, zero.deviation_mN);
     if (!alone) {
         iwn_out_known32(json, "offset_drift_mN", zero.measured, zero.drift_mN);
-        iwn_out_known32(json, "wheel_offset_mN", force->wheel_offset_heard, (int32_t)force->wheel_offset_dN * 100);
+        iwn_out_known32(json, "wheel_offset_mN", force->wheel_offset_received, (int32_t)force->wheel_offset_dN * 100);
         iwn_out_text(json, "unit_evidence", iwn_unit_observation_name(force->observation));
     }
 }

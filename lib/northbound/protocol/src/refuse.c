@@ -11,7 +11,7 @@ typedef struct {
     iwn_text_t text;
 } wording_t;
 
-#define SAY(self, ...) IWN_TEXT_JOIN(&(self)->text, __VA_ARGS__)
+#define WRITE(self, ...) IWN_TEXT_JOIN(&(self)->text, __VA_ARGS__)
 
 /// A number of a request may have any value.
 static void big_number(wording_t *self, int64_t value, const char *after) {
@@ -31,7 +31,7 @@ static void since(wording_t *self, const char *before, iw_time_us_t then_us, con
     number(self, before, (ms < INT32_MAX) ? (int32_t)ms : INT32_MAX, after);
 }
 
-static void say_holder(wording_t *self) {
+static void explain_holder(wording_t *self) {
     const iw_snapshot_t *seen = self->seen;
     const bool over = seen->arming || seen->lease_until_us <= seen->at_us;
     iwn_text_add(&self->text, self->context->holder);
@@ -43,14 +43,14 @@ static void say_holder(wording_t *self) {
     }
 }
 
-static void say_not_armed(wording_t *self) {
+static void explain_not_armed(wording_t *self) {
     const iw_stop_t *stop = self->seen->stop;
     const char *by = self->context->stopped_by;
     if (self->context->shutting_down) {
         iwn_text_add(&self->text, "not armed: the gateway is shutting down");
         return;
     }
-    SAY(self, "not armed (", iwn_state_name(self->seen->state), ")");
+    WRITE(self, "not armed (", iwn_state_name(self->seen->state), ")");
     if (stop->number == 0U) {
         iwn_text_add(&self->text, "; arm first");
         return;
@@ -58,25 +58,25 @@ static void say_not_armed(wording_t *self) {
     since(self, "; the last stop was ", stop->at_us, " ms ago: ");
     iwn_text_add(&self->text, iwn_cause_name(stop->cause));
     if (stop->cause == IW_CAUSE_CLIENT_STOP && by != NULL) {
-        SAY(self, ", requested by ", by);
+        WRITE(self, ", requested by ", by);
     }
     iwn_text_add(&self->text, ". Arm first");
 }
 
-static void say_estop(wording_t *self) {
-    SAY(self, "the e-stop ", self->context->estop,
-        (self->context->estop_answer < 0) ? " cannot be read, which counts as pressed; check its wire"
-                                          : " is pressed; release the button",
-        iwn_why_then(IW_CAUSE_ESTOP_LINE));
+static void explain_estop(wording_t *self) {
+    WRITE(self, "the e-stop ", self->context->estop,
+          (self->context->estop_answer < 0) ? " cannot be read, which counts as pressed; check its wire"
+                                            : " is pressed; release the button",
+          iwn_why_then(IW_CAUSE_ESTOP_LINE));
 }
 
-static void say_lost(wording_t *self) {
+static void explain_lost(wording_t *self) {
     for (unsigned side = 0; side < IW_SIDES; side++) {
         const iw_snapshot_wheel_t *wheel = &self->seen->wheel[side];
         if (wheel->heard) {
             continue;
         }
-        SAY(self, "the ", (side == IW_LEFT) ? "left" : "right");
+        WRITE(self, "the ", (side == IW_LEFT) ? "left" : "right");
         if (wheel->speed_us == IW_NEVER) {
             iwn_text_add(&self->text, " wheel never sent telemetry; ");
         } else {
@@ -92,33 +92,33 @@ static bool stands_too_short(const iw_snapshot_t *seen) {
     const int32_t rest_rpm = (int32_t)seen->config->rest_rpm;
     bool is_still = true;
     for (unsigned side = 0; side < IW_SIDES; side++) {
-        const int32_t rpm = seen->wheel[side].told->speed.speed_rpm;
+        const int32_t rpm = seen->wheel[side].telemetry->speed.speed_rpm;
         is_still = is_still && seen->wheel[side].heard && rpm <= rest_rpm && rpm >= -rest_rpm &&
                    seen->applied.wheel[side].speed_mm_s == 0;
     }
     return is_still;
 }
 
-static void say_not_at_rest(wording_t *self) {
+static void explain_not_at_rest(wording_t *self) {
     const iw_snapshot_t *seen = self->seen;
     // Nothing is held yet, so there is nothing to release, even if the wheels are at standstill.
     if (self->request->cmd == IWN_CMD_RELEASE && seen->holder != IW_CLIENT_NONE) {
-        say_holder(self);
+        explain_holder(self);
         return;
     }
     if (stands_too_short(seen)) {
         number(self, "the wheels are not at standstill for ", seen->config->rest_ms, " ms yet; wait, then try again");
         return;
     }
-    number(self, "the wheels turn or are commanded to: left ", seen->wheel[IW_LEFT].told->speed.speed_rpm,
+    number(self, "the wheels turn or are commanded to: left ", seen->wheel[IW_LEFT].telemetry->speed.speed_rpm,
            " rpm, commanded ");
     number(self, "", seen->applied.wheel[IW_LEFT].speed_mm_s, " mm/s; right ");
-    number(self, "", seen->wheel[IW_RIGHT].told->speed.speed_rpm, " rpm, commanded ");
+    number(self, "", seen->wheel[IW_RIGHT].telemetry->speed.speed_rpm, " rpm, commanded ");
     number(self, "", seen->applied.wheel[IW_RIGHT].speed_mm_s, " mm/s; wait until both are at standstill for ");
     number(self, "", seen->config->rest_ms, " ms");
 }
 
-static void say_stalled(wording_t *self) {
+static void explain_stalled(wording_t *self) {
     const iw_time_us_t waiting_us = self->seen->waiting_us;
     const char *more = self->context->stalled_fix;
     if (waiting_us == IW_NEVER) {
@@ -132,7 +132,7 @@ static void say_stalled(wording_t *self) {
     }
 }
 
-static void say_stale(wording_t *self) {
+static void explain_stale(wording_t *self) {
     if (self->request->cmd == IWN_CMD_DRIVE || self->request->cmd == IWN_CMD_TWIST) {
         iwn_text_add(&self->text,
                      "this command was sent before the reply to arm; wait for that reply, then send a new command");
@@ -143,37 +143,37 @@ static void say_stale(wording_t *self) {
     number(self, "; let go of the stick, wait ", IW_STALE_COMMAND_US / IW_US_PER_MS, " ms, try again");
 }
 
-static void say_second_master(wording_t *self) {
+static void explain_second_master(wording_t *self) {
     since(self, "another device sent a setpoint (id 266 = 0x10A or 298 = 0x12A) ",
           self->seen->seen_us[IW_CAUSE_SECOND_MASTER], " ms ago; switch the other sender off, wait a second");
 }
 
 /// Names the client that sends stops repeatedly, over any connection.
-static void say_estopped(wording_t *self) {
+static void explain_estopped(wording_t *self) {
     since(self, "estop_software was requested ", self->context->estopped_us, " ms ago by ");
-    SAY(self, self->context->estopped_by, "; end that program if it repeats the request, and wait a second");
+    WRITE(self, self->context->estopped_by, "; end that program if it repeats the request, and wait a second");
 }
 
-static void say_present(wording_t *self) {
+static void explain_present(wording_t *self) {
     const uint32_t present = self->seen->present;
     for (unsigned cause = 0; cause < IW_CAUSES; cause++) {
         if ((present & (1U << cause)) == 0U) {
             continue;
         }
         if (cause == IW_CAUSE_ESTOP_SOFTWARE && self->context->estopped_by != NULL) {
-            say_estopped(self);
+            explain_estopped(self);
             return;
         }
         iwn_text_add(&self->text, iwn_cause_name((iw_cause_t)cause));
         since(self, " was seen ", self->seen->seen_us[cause], " ms ago; ");
-        SAY(self, iwn_why_fix((iw_cause_t)cause), iwn_why_then((iw_cause_t)cause), ", and wait a second");
+        WRITE(self, iwn_why_fix((iw_cause_t)cause), iwn_why_then((iw_cause_t)cause), ", and wait a second");
         return;
     }
     number(self, "zeros are still being sent because the gateway died while armed; wait ",
            self->seen->config->zero_hold_ms, " ms");
 }
 
-static void say_out_of_range(wording_t *self) {
+static void explain_out_of_range(wording_t *self) {
     const iwn_request_t *request = self->request;
     if (request->cmd == IWN_CMD_TWIST) {
         big_number(self, request->v_mm_s, " mm/s with ");
@@ -183,68 +183,68 @@ static void say_out_of_range(wording_t *self) {
     iwn_text_add(&self->text, "left ");
     big_number(self, request->left_mm_s, " mm/s, right ");
     big_number(self, request->right_mm_s, " mm/s: allowed are -32768..32767 mm/s and ");
-    SAY(self, (self->seen->config->current_role == IW_ROLE_SETPOINT) ? "-2000..2000" : "0..2000",
-        " mA; nothing was applied");
+    WRITE(self, (self->seen->config->current_role == IW_ROLE_SETPOINT) ? "-2000..2000" : "0..2000",
+          " mA; nothing was applied");
 }
 
-static void say_type(wording_t *self) {
+static void explain_type(wording_t *self) {
     const bool type = self->seen->config->setpoint_type_set;
     const bool role = self->seen->config->current_role != IW_ROLE_UNSET;
     const char *it = (type || role) ? "it" : "them";
-    SAY(self, type ? "" : "setpoint_type", (type || role) ? "" : " and ", role ? "" : "current_role",
-        " not configured, and the wheels' document leaves ", it, " open; set ", it, " ", self->context->configure);
+    WRITE(self, type ? "" : "setpoint_type", (type || role) ? "" : " and ", role ? "" : "current_role",
+          " not configured, and the wheels' document leaves ", it, " open; set ", it, " ", self->context->configure);
 }
 
-static void say_track(wording_t *self) {
-    SAY(self, "track_mm not configured, and every limit of turning depends on it; set it ", self->context->configure);
+static void explain_track(wording_t *self) {
+    WRITE(self, "track_mm not configured, and every limit of turning depends on it; set it ", self->context->configure);
 }
 
-static void say_bus_down(wording_t *self) {
-    SAY(self, "bus ", self->context->bus, " is ", iwn_bus_state_name(self->seen->bus), "; ", self->context->bus_fix);
+static void explain_bus_down(wording_t *self) {
+    WRITE(self, "bus ", self->context->bus, " is ", iwn_bus_state_name(self->seen->bus), "; ", self->context->bus_fix);
 }
 
-static void say_timing(wording_t *self) {
+static void explain_timing(wording_t *self) {
     iwn_text_add(&self->text, self->context->timing);
 }
 
-static void say_missing(wording_t *self) {
-    SAY(self, (self->request->cmd == IWN_CMD_TWIST) ? "twist" : "drive",
-        " needs currents because current_role is setpoint: use drive with left_mA and right_mA");
+static void explain_missing(wording_t *self) {
+    WRITE(self, (self->request->cmd == IWN_CMD_TWIST) ? "twist" : "drive",
+          " needs currents because current_role is setpoint: use drive with left_mA and right_mA");
 }
 
 /// The last stop is still in effect.
-static void say_stop(wording_t *self) {
-    SAY(self, (self->seen->state == IW_STATE_LATCHED) ? "latched: " : "stopped: ", self->context->last_stop);
+static void explain_stop(wording_t *self) {
+    WRITE(self, (self->seen->state == IW_STATE_LATCHED) ? "latched: " : "stopped: ", self->context->last_stop);
 }
 
-static void say_listen_only(wording_t *self) {
+static void explain_listen_only(wording_t *self) {
     iwn_text_add(&self->text, self->context->listen_only);
 }
 
-static void say_contradicted(wording_t *self) {
+static void explain_contradicted(wording_t *self) {
     iwn_text_add(&self->text, self->context->contradiction);
 }
 
 void iwn_refuse_describe(const iwn_refuse_context_t *context, const iwn_request_t *request, iw_refusal_t refusal,
                          iwn_refusal_t *out_refusal) {
-    static void (*const say[IW_REFUSALS])(wording_t * self) = {
-        [IW_REFUSE_OUT_OF_RANGE] = say_out_of_range,   [IW_REFUSE_MISSING_FIELD] = say_missing,
-        [IW_REFUSE_NOT_HOLDER] = say_holder,           [IW_REFUSE_BUSY] = say_holder,
-        [IW_REFUSE_NOT_ARMED] = say_not_armed,         [IW_REFUSE_LATCHED] = say_stop,
-        [IW_REFUSE_ESTOP_PRESSED] = say_estop,         [IW_REFUSE_BUS_DOWN] = say_bus_down,
-        [IW_REFUSE_TIMING_MISMATCH] = say_timing,      [IW_REFUSE_WHEEL_LOST] = say_lost,
-        [IW_REFUSE_WHEEL_BLOCKED] = say_stop,          [IW_REFUSE_PAIR_DIVERGES] = say_stop,
-        [IW_REFUSE_NOT_AT_REST] = say_not_at_rest,     [IW_REFUSE_SEND_STALLED] = say_stalled,
-        [IW_REFUSE_SECOND_MASTER] = say_second_master, [IW_REFUSE_CAUSE_PRESENT] = say_present,
-        [IW_REFUSE_TYPE_NOT_SET] = say_type,           [IW_REFUSE_STALE_COMMAND] = say_stale,
-        [IW_REFUSE_LISTEN_ONLY] = say_listen_only,     [IW_REFUSE_CONTRADICTED] = say_contradicted,
-        [IW_REFUSE_TRACK_NOT_SET] = say_track,
+    static void (*const explain[IW_REFUSALS])(wording_t * self) = {
+        [IW_REFUSE_OUT_OF_RANGE] = explain_out_of_range,   [IW_REFUSE_MISSING_FIELD] = explain_missing,
+        [IW_REFUSE_NOT_HOLDER] = explain_holder,           [IW_REFUSE_BUSY] = explain_holder,
+        [IW_REFUSE_NOT_ARMED] = explain_not_armed,         [IW_REFUSE_LATCHED] = explain_stop,
+        [IW_REFUSE_ESTOP_PRESSED] = explain_estop,         [IW_REFUSE_BUS_DOWN] = explain_bus_down,
+        [IW_REFUSE_TIMING_MISMATCH] = explain_timing,      [IW_REFUSE_WHEEL_LOST] = explain_lost,
+        [IW_REFUSE_WHEEL_BLOCKED] = explain_stop,          [IW_REFUSE_PAIR_DIVERGES] = explain_stop,
+        [IW_REFUSE_NOT_AT_REST] = explain_not_at_rest,     [IW_REFUSE_SEND_STALLED] = explain_stalled,
+        [IW_REFUSE_SECOND_MASTER] = explain_second_master, [IW_REFUSE_CAUSE_PRESENT] = explain_present,
+        [IW_REFUSE_TYPE_NOT_SET] = explain_type,           [IW_REFUSE_STALE_COMMAND] = explain_stale,
+        [IW_REFUSE_LISTEN_ONLY] = explain_listen_only,     [IW_REFUSE_CONTRADICTED] = explain_contradicted,
+        [IW_REFUSE_TRACK_NOT_SET] = explain_track,
     };
     wording_t wording = {context, context->seen, request,
                          iwn_text_begin(out_refusal->message, sizeof out_refusal->message)};
     out_refusal->error = iwn_error_of(refusal);
-    if ((unsigned)refusal < IW_REFUSALS && say[refusal] != NULL) {
-        say[refusal](&wording);
+    if ((unsigned)refusal < IW_REFUSALS && explain[refusal] != NULL) {
+        explain[refusal](&wording);
     } else {
         number(&wording, "refused for a reason that has no name (", (int32_t)refusal, "); report this");
     }

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "iwheel_northbound/request.h"
 
-#include "request_fields.h"
-
 #include <string.h>
 
 typedef enum { INTEGER, RATE, TEXT, FLAG, TOPICS, SIDE, ITEM, VALUE } field_kind_t;
@@ -31,13 +29,12 @@ typedef struct {
 #define INDEX(name, member, kind, bytes, required, allowed) FIELD_##member,
 #define HAS_ROOM(name, member, kind, bytes, required, allowed)                                                         \
     &&((bytes) == 0 || sizeof(((iwn_request_t *)0)->member) == (bytes) + 1U)
-#define NAME(name) #name,
+#define NAME(cmd, name) #name,
 
 static const field_t fields[] = {IWN_REQUEST_FIELDS(ROW)};
 enum { IWN_REQUEST_FIELDS(INDEX) FIELDS };
 
 static const char *const cmd_names[] = {IWN_REQUEST_NAMES(NAME)};
-IW_STATIC_ASSERT(sizeof cmd_names / sizeof cmd_names[0] == IWN_CMDS, a_name_for_each_command);
 IW_STATIC_ASSERT(true IWN_REQUEST_FIELDS(HAS_ROOM), room_for_each_text_and_its_terminator);
 IW_STATIC_ASSERT(IWN_CMDS <= 24 && FIELDS <= 32, a_bit_for_each_command_and_each_field);
 
@@ -225,7 +222,11 @@ static bool read_id(iwn_json_t value, iwn_id_t *out_id, iwn_refusal_t *out_refus
                       number(IWN_ID_TEXT_MAX, digits), " bytes", NOT_PLAIN);
 }
 
-static bool read_cmd(iwn_json_t value, iwn_cmd_t *out_cmd, iwn_refusal_t *out_refusal) {
+static bool read_cmd(iwn_json_t name, iwn_cmd_t *out_cmd, iwn_refusal_t *out_refusal) {
+    if (name.at == NULL) {
+        return IWN_REFUSE(out_refusal, IWN_MISSING_FIELD, "a request needs cmd", EXAMPLE);
+    }
+    const iwn_json_t value = iwn_json_value(name);
     if (iwn_json_kind(value) != IWN_JSON_TEXT) {
         return IWN_REFUSE(out_refusal, IWN_BAD_VALUE, "cmd must be a text", EXAMPLE);
     }
@@ -252,13 +253,10 @@ static iwn_json_t find_name(const members_t *members, const char *text) {
 static bool read_common(members_t *members, iwn_request_t *request, iwn_refusal_t *out_refusal) {
     members->id = find_name(members, "id");
     members->cmd = find_name(members, "cmd");
-    if (members->id.at != NULL && !read_id(iwn_json_value(members->id), &request->id, out_refusal)) {
-        return false;
-    }
-    if (members->cmd.at == NULL) {
-        return IWN_REFUSE(out_refusal, IWN_MISSING_FIELD, "a request needs cmd", EXAMPLE);
-    }
-    return read_cmd(iwn_json_value(members->cmd), &request->cmd, out_refusal);
+    const bool known = read_cmd(members->cmd, &request->cmd, out_refusal);
+    // The refusal of the id replaces that of the command.
+    const bool good = members->id.at == NULL || read_id(iwn_json_value(members->id), &request->id, out_refusal);
+    return known && (good || iwn_cmd_stops(request->cmd));
 }
 
 static const field_t *find_field(iwn_json_t name, iwn_cmd_t cmd) {
@@ -291,7 +289,7 @@ static bool refuse_unknown(iwn_cmd_t cmd, iwn_json_t name, iwn_refusal_t *out_re
 }
 
 /// Reads the fields. If one is unknown or invalid, the refusal names the first of these in the line. `*out_seen` has a
-/// bit for each field.
+/// bit for each field. A stop ignores such fields; of an invalid reason it has the usable part.
 static bool read_fields(const members_t *members, iwn_request_t *request, uint32_t *out_seen,
                         iwn_refusal_t *out_refusal) {
     iwn_json_t wrong = {NULL};
@@ -304,6 +302,8 @@ static bool read_fields(const members_t *members, iwn_request_t *request, uint32
         const field_t *const field = find_field(name, request->cmd);
         if (field != NULL && read_field(field, iwn_json_value(name), request, out_refusal)) {
             *out_seen |= 1U << (field - fields);
+        } else if (iwn_cmd_stops(request->cmd)) {
+            iwn_plain_blank(request->reason);
         } else {
             wrong = name;
             unknown = field == NULL;

@@ -70,6 +70,15 @@ bool iwn_plain_text(const char *text) {
     return true;
 }
 
+void iwn_plain_blank(char *text) {
+    size_t bytes;
+    for (; *text != '\0'; text += bytes) {
+        if (!iwn_plain_is(iwn_plain_read(text, &bytes))) {
+            memset(text, ' ', bytes);
+        }
+    }
+}
+
 /// Returns true if JSON shows the byte unchanged.
 static bool is_plain(char c) {
     return c >= 0x20 && c < 0x7F && c != '"' && c != '\\';

@@ -25,7 +25,7 @@ static bool would_move(const iw_config_t *config, const iw_drive_t *wanted) {
 static void refuse_unjudged(iwn_server_t *self, iwn_client_t *client, const iw_drive_t *wanted) {
     const iw_drive_t unknown = {.speed_mm_s = {INT32_MAX, INT32_MAX}};
     iw_applied_t applied;
-    if (would_move(iwn_server_look(self)->config, wanted)) {
+    if (would_move(iwn_server_snapshot(self)->config, wanted)) {
         (void)judge(self, client, self->now_us, &unknown, &applied);
     }
     iwn_server_refuse(self, client, &self->request.id);
@@ -36,7 +36,7 @@ static void refuse_unjudged(iwn_server_t *self, iwn_client_t *client, const iw_d
 static bool has_wrong_key(iwn_server_t *self, const iwn_client_t *client) {
     const char *const key = self->request.lease_key;
     return key[0] != '\0' && iw_gateway_state(self->core) == IW_STATE_ARMED &&
-           iwn_server_look(self)->holder == client->id && !iwn_target_is_key(self, client, key);
+           iwn_server_snapshot(self)->holder == client->id && !iwn_target_is_key(self, client, key);
 }
 
 static void drive(iwn_server_t *self, iwn_client_t *client, const iw_drive_t *wanted) {
@@ -82,7 +82,7 @@ static int32_t limit(int64_t value) {
 void iwn_server_twist(iwn_server_t *self, iwn_client_t *client) {
     const int32_t v_mm_s = limit(self->request.v_mm_s);
     const int32_t yaw_mrad_s = limit(self->request.yaw_mrad_s);
-    const iw_snapshot_t *const seen = iwn_server_look(self);
+    const iw_snapshot_t *const seen = iwn_server_snapshot(self);
     if (yaw_mrad_s != 0 && seen->assumed[IW_ASSUMPTION_TRACK].state == IW_CONTRADICTED) {
         refuse_turn(self, client);
         return;

@@ -11,7 +11,7 @@ void iwn_server_begin(iwn_server_t *self) {
 
 void iwn_server_refuse_as(iwn_server_t *self, iwn_client_t *client, iw_refusal_t refusal) {
     iwn_refuse_context_t context = {
-        .seen = iwn_server_look(self),
+        .seen = iwn_server_snapshot(self),
         .last_stop = self->last_stop.sentence,
         .estopped_us = self->estopped_us,
         .estop = self->estop.line,
@@ -103,7 +103,7 @@ static void do_stop(iwn_server_t *self, iwn_client_t *client) {
 }
 
 static void do_estop(iwn_server_t *self, iwn_client_t *client) {
-    const iw_snapshot_t *const seen = iwn_server_look(self);
+    const iw_snapshot_t *const seen = iwn_server_snapshot(self);
     const bool latched = seen->state == IW_STATE_LATCHED;
     iwn_target_asked_to_stop(self, client);
     self->estopped_us = self->now_us;
@@ -136,7 +136,7 @@ static void do_judged(iwn_server_t *self, iwn_client_t *client) {
 }
 
 static void do_tare(iwn_server_t *self, iwn_client_t *client) {
-    const iw_snapshot_t *const seen = iwn_server_look(self);
+    const iw_snapshot_t *const seen = iwn_server_snapshot(self);
     const uint8_t sides = self->request.sides;
     const iw_force_t before[IW_SIDES] = {*seen->wheel[IW_LEFT].force, *seen->wheel[IW_RIGHT].force};
     const iw_force_quality_t window[IW_SIDES] = {iw_force_measure(&before[IW_LEFT]),
@@ -227,7 +227,7 @@ static bool is_late(iwn_server_t *self) {
     if (!self->request.has_t_us && !self->request.has_stop) {
         return false;
     }
-    const iw_stop_t *const stop = iwn_server_look(self)->stop;
+    const iw_stop_t *const stop = iwn_server_snapshot(self)->stop;
     const iw_time_us_t asked_us = (self->stopped_us > self->estopped_us) ? self->stopped_us : self->estopped_us;
     const iwn_moment_t moment = {self->now_us, (stop->at_us > asked_us) ? stop->at_us : asked_us, stop->number,
                                  self->max_age_ms};
@@ -237,7 +237,7 @@ static bool is_late(iwn_server_t *self) {
 void iwn_server_request(iwn_server_t *self, iwn_client_t *client) {
     if (client->watches_only && !iwn_cmd_watches(self->request.cmd)) {
         self->refusal.error = IWN_DENIED;
-        iwn_target_say_right(self);
+        iwn_target_refuse_right(self);
         iwn_server_refuse(self, client, &self->request.id);
         return;
     }
@@ -246,5 +246,5 @@ void iwn_server_request(iwn_server_t *self, iwn_client_t *client) {
         return;
     }
     carry_out(self, client);
-    iwn_server_observe(self, iwn_server_look(self));
+    iwn_server_observe(self, iwn_server_snapshot(self));
 }

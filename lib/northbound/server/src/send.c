@@ -11,7 +11,7 @@ void iwn_server_welcome(iwn_client_t *client, iw_client_t id, bool watches_only)
     client->rate_hz = IWN_RATE_DEFAULT_HZ;
 }
 
-const iw_snapshot_t *iwn_server_look(iwn_server_t *self) {
+const iw_snapshot_t *iwn_server_snapshot(iwn_server_t *self) {
     iw_gateway_snapshot(self->core, self->now_us, &self->seen);
     return &self->seen;
 }
@@ -132,10 +132,10 @@ static void send_force(iwn_server_t *self, const iw_snapshot_t *seen) {
 void iwn_server_periodic(iwn_server_t *self) {
     const uint8_t topics = find_due(self);
     if ((topics & (1U << IWN_TOPIC_STATE)) != 0U) {
-        iwn_target_state(self, iwn_server_look(self), true);
+        iwn_target_state(self, iwn_server_snapshot(self), true);
     }
     if ((topics & (1U << IWN_TOPIC_FORCE)) != 0U) {
-        send_force(self, iwn_server_look(self));
+        send_force(self, iwn_server_snapshot(self));
     }
 }
 

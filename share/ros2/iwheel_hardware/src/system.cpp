@@ -19,9 +19,9 @@ public:
   using Result = hardware_interface::CallbackReturn;
   using Return = hardware_interface::return_type;
 
-  Result on_init(const hardware_interface::HardwareInfo & info) override
+  Result on_init(const hardware_interface::HardwareComponentInterfaceParams & params) override
   {
-    if (SystemInterface::on_init(info) != Result::SUCCESS) {
+    if (SystemInterface::on_init(params) != Result::SUCCESS) {
       return Result::ERROR;
     }
     if (info_.joints.size() != SIDES) {

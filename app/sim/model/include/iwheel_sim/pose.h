@@ -16,7 +16,7 @@
 
 typedef struct {
     iw_time_us_t now_us;
-    iw_time_us_t left_heard_us;
+    iw_time_us_t left_received_us;
     int64_t left_nm; ///< Distance of the left wheel that is not in the pose yet.
     int64_t right_last_nm;
     int64_t x_nm;

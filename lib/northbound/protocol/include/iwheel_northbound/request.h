@@ -12,6 +12,7 @@
 #define IWHEEL_NORTHBOUND_REQUEST_H
 
 #include "iwheel_northbound/json_in.h"
+#include "iwheel_northbound/request_fields.h"
 #include "iwheel_northbound/words.h"
 
 #ifdef __cplusplus
@@ -29,28 +30,10 @@ extern "C" {
 #define IWN_RATE_MAX_HZ     100  ///< Highest rate of events.
 #define IWN_RATE_DEFAULT_HZ 10   ///< Rate without `rate_hz`.
 
-/// Commands. share/northbound.json has their names.
-typedef enum {
-    IWN_CMD_HELLO = 0,
-    IWN_CMD_STATUS,
-    IWN_CMD_WATCH,
-    IWN_CMD_ARM,
-    IWN_CMD_DRIVE,
-    IWN_CMD_TWIST,
-    IWN_CMD_STOP,
-    IWN_CMD_DISARM,
-    IWN_CMD_ESTOP,
-    IWN_CMD_RESET,
-    IWN_CMD_RELEASE,
-    IWN_CMD_TARE,
-    IWN_CMD_WHY,
-    IWN_CMD_CONFIRM,
-    IWN_CMD_RECORDINGS,
-    IWN_CMD_RECORDING,
-    IWN_CMD_RECORD,
-    IWN_CMD_CONFIG,
-    IWN_CMDS,
-} iwn_cmd_t;
+/// One command of `iwn_cmd_t`.
+#define IWN_REQUEST_CMD(cmd, name) IWN_CMD_##cmd,
+/// Commands in the order of share/northbound.json: IWN_CMD_HELLO, IWN_CMD_STATUS and so on.
+typedef enum { IWN_REQUEST_NAMES(IWN_REQUEST_CMD) IWN_CMDS } iwn_cmd_t;
 
 /// Returns true for commands of a client that may only watch: read, stop and e-stop.
 bool iwn_cmd_watches(iwn_cmd_t cmd);
@@ -116,6 +99,9 @@ bool iwn_refuse(iwn_refusal_t *out_refusal, iwn_error_t error, const char *const
 /// Reads `length` bytes without newline. Returns true if `*out_request` is complete. Returns false and writes
 /// `*out_refusal` otherwise; `out_request->id` then has the id if it could be read. Errors are reported in this order:
 /// the line as a whole, the id, the command, its fields in their order, missing fields.
+///
+/// An object that names a stop (`iwn_cmd_stops`) is always accepted. Its unknown fields and an invalid id are ignored. A
+/// reason that is too long is cut, and in an invalid one each byte of a character that is not allowed becomes a space.
 bool iwn_request_read(const char *line, size_t length, iwn_work_t *work, iwn_request_t *out_request,
                       iwn_refusal_t *out_refusal);
 

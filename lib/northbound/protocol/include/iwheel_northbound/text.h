@@ -31,6 +31,9 @@ bool iwn_plain_is(uint32_t code_point);
 /// Returns true if all characters are plain.
 bool iwn_plain_text(const char *text);
 
+/// Replaces each byte of the characters that are not plain by a space.
+void iwn_plain_blank(char *text);
+
 /// Returns the number of leading bytes that JSON shows unchanged: printable ASCII without quote and backslash.
 size_t iwn_plain_length(const char *text, size_t length);
 

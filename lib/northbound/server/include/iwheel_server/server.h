@@ -82,7 +82,7 @@ typedef struct iwn_server {
     iw_time_us_t stopped_us, estopped_us; ///< Time of the last request of a client; 0 if there was none.
     iw_client_t stopped_by, estopped_by;  ///< Client of that request.
     iwn_reported_t reported;
-    iw_snapshot_t seen;        ///< Snapshot of iwn_server_look.
+    iw_snapshot_t seen;        ///< Snapshot of iwn_server_snapshot.
     iwn_request_t request;     ///< The caller sets it before iwn_server_request.
     iwn_stop_note_t last_stop; ///< The last stop, with its sentence.
     iwn_refusal_t refusal;     ///< Reason of a refusal, written by the function that refuses.
@@ -114,7 +114,7 @@ iw_time_us_t iwn_server_next_us(iwn_server_t *self);
 // Functions for replies and events of a target.
 
 /// Returns a snapshot of the core. It is valid until the next call.
-const iw_snapshot_t *iwn_server_look(iwn_server_t *self);
+const iw_snapshot_t *iwn_server_snapshot(iwn_server_t *self);
 
 /// Returns the client with this id; NULL if it is gone.
 iwn_client_t *iwn_server_find(iwn_server_t *self, iw_client_t id);

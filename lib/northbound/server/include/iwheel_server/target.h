@@ -2,6 +2,9 @@
 /// @file
 /// Functions that a program adds to the server. Each program defines them once, at link time. There are no function
 /// pointers, so that the worst-case stack can be computed from the calls.
+///
+/// The server calls them from its own functions, in the context of its caller. They must not wait, and must not call
+/// `iwn_server_request`. Pointers that they receive are valid until they return.
 #ifndef IWHEEL_SERVER_TARGET_H
 #define IWHEEL_SERVER_TARGET_H
 
@@ -16,10 +19,12 @@ extern "C" {
 /// Returns the connected client after `after` in a fixed order; the first one if it is NULL. Returns NULL at the end.
 iwn_client_t *iwn_target_next(iwn_server_t *self, const iwn_client_t *after);
 
-/// Returns the buffer of the next reply or event, of `*out_size` bytes.
+/// Returns the buffer of the next reply or event, of `*out_size` bytes. There is one buffer: a call discards a line
+/// that was not sent.
 char *iwn_target_line(iwn_server_t *self, size_t *out_size);
 
-/// Sends the line in the buffer, with its newline. `length` 0: the line did not fit.
+/// Sends the line in the buffer, with its newline. `length` 0: the line did not fit. After a reply that cannot be sent
+/// the daemon closes the connection; the board counts it and reports the number in the event `lost`.
 void iwn_target_reply(iwn_server_t *self, iwn_client_t *client, char *line, size_t length);
 
 /// Sends an event in the same way. A client without space loses it.
@@ -38,14 +43,15 @@ void iwn_target_state(iwn_server_t *self, const iw_snapshot_t *seen, bool due_on
 bool iwn_target_permits(iwn_server_t *self, iwn_client_t *client);
 
 /// Writes the message for a client that may only watch to `self->refusal.message`.
-void iwn_target_say_right(iwn_server_t *self);
+void iwn_target_refuse_right(iwn_server_t *self);
 
 /// Returns true if `key` is the key of the client's lease. Otherwise `self->refusal` has the reason. The key is not
 /// empty, and the client holds the lease.
 bool iwn_target_is_key(iwn_server_t *self, const iwn_client_t *client, const char *key);
 
-/// Writes the latest possible send time of the command in `self->request`, at which its lease starts. Returns false if
-/// the command is too old or cannot show its age; `self->refusal` has the reason.
+/// Writes the latest possible send time of the command in `self->request`, at which its lease starts. The caller sets
+/// `*out_sent_us` to the time of the request before; a target without a better value leaves it unchanged. Returns false
+/// if the command is too old or cannot show its age; `self->refusal` has the reason.
 bool iwn_target_is_fresh(iwn_server_t *self, iwn_client_t *client, iw_time_us_t *out_sent_us);
 
 // Reports of executed requests.

@@ -1,28 +1,29 @@
 // SPDX-License-Identifier: MIT
-// The requests and their fields, except cmd and id. Written by scripts/northbound.py from share/northbound.json.
+/// @file
+/// The requests and their fields, except cmd and id. Written by scripts/northbound.py from share/northbound.json.
 #ifndef IWHEEL_NORTHBOUND_REQUEST_FIELDS_H
 #define IWHEEL_NORTHBOUND_REQUEST_FIELDS_H
 
-/// Names in the order of iwn_cmd_t.
+/// Each request as in iwn_cmd_t, and its name.
 #define IWN_REQUEST_NAMES(NAME)                                                                                        \
-    NAME(hello)                                                                                                        \
-    NAME(status)                                                                                                       \
-    NAME(watch)                                                                                                        \
-    NAME(arm)                                                                                                          \
-    NAME(drive)                                                                                                        \
-    NAME(twist)                                                                                                        \
-    NAME(stop)                                                                                                         \
-    NAME(disarm)                                                                                                       \
-    NAME(estop)                                                                                                        \
-    NAME(reset)                                                                                                        \
-    NAME(release)                                                                                                      \
-    NAME(tare)                                                                                                         \
-    NAME(why)                                                                                                          \
-    NAME(confirm)                                                                                                      \
-    NAME(recordings)                                                                                                   \
-    NAME(recording)                                                                                                    \
-    NAME(record)                                                                                                       \
-    NAME(config)
+    NAME(HELLO, hello)                                                                                                 \
+    NAME(STATUS, status)                                                                                               \
+    NAME(WATCH, watch)                                                                                                 \
+    NAME(ARM, arm)                                                                                                     \
+    NAME(DRIVE, drive)                                                                                                 \
+    NAME(TWIST, twist)                                                                                                 \
+    NAME(STOP, stop)                                                                                                   \
+    NAME(DISARM, disarm)                                                                                               \
+    NAME(ESTOP, estop)                                                                                                 \
+    NAME(RESET, reset)                                                                                                 \
+    NAME(RELEASE, release)                                                                                             \
+    NAME(TARE, tare)                                                                                                   \
+    NAME(WHY, why)                                                                                                     \
+    NAME(CONFIRM, confirm)                                                                                             \
+    NAME(RECORDINGS, recordings)                                                                                       \
+    NAME(RECORDING, recording)                                                                                         \
+    NAME(RECORD, record)                                                                                               \
+    NAME(CONFIG, config)
 
 /// Name, member of iwn_request_t, kind, largest size of a text in bytes, required, requests with this field.
 #define IWN_REQUEST_FIELDS(ROW)                                                                                        \

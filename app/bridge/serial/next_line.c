@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: MIT
+// Lines to the board, in the order of their importance.
+#include "relay.h"
+
+#include <stdio.h>
+#include <string.h>
+
+static size_t write_line(uint8_t channel, const char *json, size_t length, char *out, size_t size) {
+    return iwn_line_write(&(iwn_line_t){.channel = channel, .json = json, .length = length}, out, size);
+}
+
+/// Opening and closing of channels precede all requests but stops.
+static size_t next_open_or_close(relay_t *self, char *out, size_t size) {
+    char json[64];
+    for (unsigned i = 1; i <= IWN_LINE_CHANNELS; i++) {
+        relay_channel_t *channel = &self->channel[i];
+        const bool again = channel->state == RELAY_OPENING && self->now_us >= channel->opened_us + RELAY_OPEN_US;
+        if (!channel->close_due && channel->state != RELAY_NEW && !again) {
+            continue;
+        }
+        channel->served = false;
+        if (channel->close_due) {
+            channel->close_due = false;
+            (void)snprintf(json, sizeof json, "{\"cmd\":\"close\",\"channel\":%u}", i);
+        } else {
+            channel->state = RELAY_OPENING;
+            channel->opened_us = self->now_us;
+            (void)snprintf(json, sizeof json, "{\"cmd\":\"open\",\"channel\":%u,\"watch\":%s}", i,
+                           channel->watch ? "true" : "false");
+        }
+        return write_line(0, json, strlen(json), out, size);
+    }
+    return 0;
+}
+
+static size_t next_request(relay_t *self, char *out, size_t size) {
+    for (unsigned i = 0; i < IWN_LINE_CHANNELS; i++) {
+        const unsigned number = 1U + (self->next_channel + i) % IWN_LINE_CHANNELS;
+        relay_channel_t *channel = &self->channel[number];
+        serial_request_t *request =
+            (channel->state == RELAY_WELCOMED) ? serial_queue_next(&channel->queue, self->now_us) : NULL;
+        if (request != NULL) {
+            self->next_channel = number % IWN_LINE_CHANNELS;
+            serial_queue_sent(request, self->now_us);
+            return write_line((uint8_t)number, request->json, request->length, out, size);
+        }
+    }
+    return 0;
+}
+
+static size_t next_sign_of_life(relay_t *self, char *out, size_t size) {
+    static const char alive[] = "{\"cmd\":\"alive\"}";
+    if (self->link.state == SERIAL_SILENT && self->now_us >= self->asked_us + RELAY_ASK_US) {
+        self->asked_us = self->now_us;
+        return write_line(0, RELAY_ASK, sizeof RELAY_ASK - 1U, out, size);
+    }
+    return (self->link.state == SERIAL_LINKED && sock_clients_count(&self->clients) > 0U &&
+            self->now_us >= self->written_us + RELAY_ALIVE_US)
+               ? write_line(0, alive, sizeof alive - 1U, out, size)
+               : 0U;
+}
+
+size_t relay_next_line(relay_t *self, char *out, size_t size) {
+    size_t length = 0;
+    if (self->link.state == SERIAL_LINKED) {
+        length = relay_next_stop(self, out, size);
+        if (length == 0U) {
+            length = next_open_or_close(self, out, size);
+        }
+    }
+    if (length == 0U) {
+        length = next_sign_of_life(self, out, size);
+    }
+    return (length > 0U || self->link.state == SERIAL_SILENT) ? length : next_request(self, out, size);
+}

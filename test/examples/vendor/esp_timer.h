@@ -1,0 +1,10 @@
+// SPDX-License-Identifier: MIT
+// Only what examples/hal uses, after the documentation of ESP-IDF.
+#ifndef ESP_TIMER_H
+#define ESP_TIMER_H
+
+#include <stdint.h>
+
+int64_t esp_timer_get_time(void);
+
+#endif
