@@ -22,6 +22,7 @@ from verdict import CRASH, Attempt, Failure, Session, explains, kind_of
 
 KINDS = ("latencies", "from_level")  # of the e-stop: since the edge, since the level
 SWITCH_S = 0.0005  # between threads of a test: a press does not wait for the recorder
+START_US = 1_000_000  # Limit of a restart in real time: fork and exec alone take 0.3 s in such a kernel on a busy machine.
 LIMIT_S, FULL_LIMIT_S, SOAK_LIMIT_S = 600, 3600, 100_000  # of one test, by the guest's clock
 
 
@@ -30,6 +31,8 @@ def run_one(entry, plan):
     test, skip, begin_us = kernel_rig.KernelTest(plan["build"], entry.rig_type), None, kernel_rig.now_us()
     test.plan = plan
     harness.PACE["slow"] = entry.pace if plan["virtual"] else 1
+    if not plan["virtual"] and not plan["native"]:
+        harness.Rig.restart_us = START_US
     try:
         entry.function(test)
     except Skip as reason:

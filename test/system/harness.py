@@ -226,6 +226,7 @@ class Rig:
     """One simulator, one bus recorder, one gateway (restartable), one timeline."""
 
     exit_clears = True  # The simulator forgets the waiting frames of a client that ends; a kernel does not.
+    restart_us = RESTART_US
 
     def __init__(self, build, config=None, sim_args=(), estop=True):
         self.build = build
@@ -340,7 +341,7 @@ class Rig:
         self.processes.append(self.gateway)
         self.timeline.append(Event(begin_us, "start"))
         if restart_hold:
-            self.timeline.append(Event(begin_us, "restart_hold", within_us=RESTART_US))
+            self.timeline.append(Event(begin_us, "restart_hold", within_us=self.restart_us))
         wait_connect(self.path(self.socket_name), self.gateway).close()
         client = self.client(name="starter")
         client.request("hello")

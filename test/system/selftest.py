@@ -268,9 +268,23 @@ def goods():
     yield "no motion wanted, none made", [x for x in f if not is_setpoint(x)], [e[0]], {"moves": False}
 
 
+def timings():
+    """(name, frames, events, rule, whether a measured stall of that length can be the reason)"""
+    f, e = good(), script()
+    yield "600 ms without setpoints", between(f, 2_200, 2_800, drop), e, "gap", True
+    yield "e-stop answered after 400 ms", between(f, 3_521, 5_100, late(400)), e, "estop_latency", True
+    yield "driving on for a second after the lease", f, without(e, "drive", 2_000, 3_510), "lease", False
+    yield "e-stop ignored for a second", between(f, 3_515, 4_500, with_data(1, 300)), e, "nonzero_after_estop", False
+
+
 def run():
     """Returns (number of checks, list of failures)."""
     failures, count = [], 0
+    for name, frames, events, rule, wanted in timings():
+        count += 1
+        found = [v for v in verdict(frames, events) if v.rule == rule]
+        if not found or all(v.timing for v in found) != wanted:
+            failures.append(f"'{name}': {rule} counts as a failure {'of the rule' if wanted else 'in time'} (found: {found[:2]})")
     for name, frames, events, options in goods():
         count += 1
         options = dict(options)
