@@ -10,14 +10,14 @@
 
 void sock_client_read(sock_client_t *self) {
     const size_t space = sizeof self->in - self->in_length;
-    if (space == 0U || self->phase == SOCK_ENDED || sock_client_is_closing(self)) {
+    if (space == 0U || self->phase != SOCK_OPEN) {
         return;
     }
     const ssize_t count = recv(self->fd, &self->in[self->in_length], space, MSG_DONTWAIT);
     self->drained = count < (ssize_t)space;
     if (count > 0) {
         self->in_length += (size_t)count;
-    } else if (count == 0 && self->phase == SOCK_OPEN) {
+    } else if (count == 0) {
         self->phase = SOCK_ENDED;
     } else if (count < 0 && errno != EAGAIN && errno != EINTR) {
         sock_client_break(self);

@@ -42,18 +42,12 @@ void relay_refuse(relay_t *self, sock_client_t *client, const iwn_id_t *id, iwn_
     sock_clients_refuse(&self->clients, client, id, &refusal);
 }
 
-/// Closes the client. Its stops among the bytes that were not read are executed.
-static void let_go(relay_t *self, sock_client_t *client) {
-    sock_client_read(client);
-    sock_service_finish(&self->clients, client);
-}
-
 static void turn_away(relay_t *self, sock_client_t *client, const char *why) {
     sock_log(&self->log, SOCK_LOG_INFO, "client %u (pid %d) is closed: %s", (unsigned)client->id, client->pid, why);
     iwn_refusal_t refusal;
     (void)IWN_REFUSE(&refusal, IWN_BUS_DOWN, "no board on the serial line: ", why);
     sock_clients_refuse(&self->clients, client, &(iwn_id_t){.kind = IWN_ID_NONE}, &refusal);
-    let_go(self, client);
+    sock_service_finish(&self->clients, client);
 }
 
 /// Returns the time after which the answer to a `drive` is lost: a line of the largest size may precede it.
@@ -314,7 +308,7 @@ static void drop_client(relay_t *self, relay_channel_t *channel) {
     release(channel);
     channel->served = false;
     if (client != NULL) {
-        let_go(self, client);
+        sock_service_finish(&self->clients, client);
     }
 }
 
