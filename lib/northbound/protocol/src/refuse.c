@@ -169,7 +169,7 @@ static void explain_present(wording_t *self) {
         WRITE(self, iwn_why_fix((iw_cause_t)cause), iwn_why_then((iw_cause_t)cause), ", and wait a second");
         return;
     }
-    number(self, "zeros are still being sent because the gateway died while armed; wait ",
+    number(self, "zeros are still sent after a crash or a delay of the gateway; wait ",
            self->seen->config->zero_hold_ms, " ms");
 }
 
