@@ -3,6 +3,7 @@
 
 import contextlib
 import csv
+import functools
 import json
 import os
 import shutil
@@ -20,30 +21,35 @@ SIZES = {"desk": (1440, 900), "phone": (390, 844)}
 ASSETS = Path(os.environ.get("IWHEEL_WEB_ASSETS") or Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "iwheel/web")
 
 
-@contextlib.contextmanager
-def page_of(rig, size="desk", scheme="light", url=None, **device):
-    """The page, open and live; anything on its console is an error."""
+@functools.cache
+def browser():
+    """One for each test: all of its pages, in contexts of their own, run in it until the test's process ends."""
     try:
         from playwright.sync_api import sync_playwright
     except ImportError as error:
         raise Skip("playwright is missing in .venv (scripts/python_packages .venv requirements/check.txt)") from error
-    chromium = shutil.which("chromium")
+    chromium = shutil.which("chromium-headless-shell") or shutil.which("chromium")
     if not chromium:
-        raise Skip("chromium is missing (scripts/install_tools check brings it)")
+        raise Skip("chromium-headless-shell is missing (scripts/install_tools check brings it)")
+    return sync_playwright().start().chromium.launch(executable_path=chromium, args=["--no-sandbox", "--disable-gpu"])
+
+
+@contextlib.contextmanager
+def page_of(rig, size="desk", scheme="light", url=None, **device):
+    """The page, open and live, with its own cookies and storage; anything on its console is an error."""
     said = []
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox", "--disable-gpu"])
-        try:
-            page = browser.new_page(viewport=dict(zip(("width", "height"), SIZES[size], strict=False)), color_scheme=scheme, accept_downloads=True, **device)
-            page.set_default_timeout(15000)
-            page.on("console", lambda message: said.append(message.text) if message.type == "error" and "Failed to load resource" not in message.text else None)
-            page.on("pageerror", lambda error: said.append(str(error)))
-            page.goto(url or rig.url)
-            page.said = said
-            yield page
-            assert not said, said
-        finally:
-            browser.close()
+    context = browser().new_context(viewport=dict(zip(("width", "height"), SIZES[size], strict=False)), color_scheme=scheme, accept_downloads=True, **device)
+    try:
+        page = context.new_page()
+        page.set_default_timeout(15000)
+        page.on("console", lambda message: said.append(message.text) if message.type == "error" and "Failed to load resource" not in message.text else None)
+        page.on("pageerror", lambda error: said.append(str(error)))
+        page.goto(url or rig.url)
+        page.said = said
+        yield page
+        assert not said, said
+    finally:
+        context.close()
 
 
 def seen(page, condition):
