@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """A passive listener on the local bus: records every frame with the kernel's time stamp, and can send frames as a node of its own."""
 
+import bisect
 import contextlib
 import socket
 import struct
@@ -11,6 +12,7 @@ from judge_log import Frame, signed
 
 FRAME = struct.Struct("=IBBB x8s")  # struct can_frame: id, length, pad, res0 (1: echo of our own frame, 2: error frame of a client), data
 SO_TIMESTAMPNS = 35
+ORDERED_US = 1_000_000  # Frames are in the order of their stamps, except for small steps between the clocks.
 EXTENDED, REMOTE, ERROR = 0x80000000, 0x40000000, 0x20000000
 
 
@@ -68,7 +70,9 @@ class Bus:
 
     def setpoints(self, since_us=0):
         """The gateway's setpoints as (t_us, id, mm/s)."""
-        return [(f.t_us, f.id, signed(f.data, 1)) for f in list(self.frames) if f.id in (266, 298) and not f.own and f.t_us >= since_us and len(f.data) >= 3]
+        frames = self.frames
+        begin = bisect.bisect_left(frames, since_us - ORDERED_US, key=lambda frame: frame.t_us)
+        return [(f.t_us, f.id, signed(f.data, 1)) for f in frames[begin:] if f.id in (266, 298) and not f.own and f.t_us >= since_us and len(f.data) >= 3]
 
     def speed_rpm(self, side):
         """The wheel's last speed frame."""

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 from bus import now_us
-from trials import Driver, Skip, braking_ms, until
+from trials import RECENT_US, Driver, Skip, braking_ms, until
 
 SIZES = {"desk": (1440, 900), "phone": (390, 844)}
 ASSETS = Path(os.environ.get("IWHEEL_WEB_ASSETS") or Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "iwheel/web")
@@ -231,7 +231,7 @@ def hold(page):
 
 
 def turns(rig):
-    return until(lambda: rig.bus.setpoints() and rig.bus.setpoints()[-1][2] > 60, 5, "the wheels are commanded to turn")
+    return until(lambda: (sent := rig.bus.setpoints(now_us() - RECENT_US)) and sent[-1][2] > 60, 5, "the wheels are commanded to turn")
 
 
 # Another window has the focus; two fingers on a touchpad.

@@ -14,7 +14,7 @@ from bus import now_us
 from judge_log import LEFT, RIGHT
 from test_bridge import start_lan
 from test_browser import SIZES, live, mouse_on_stop, page_of, press_stop, seen, turns
-from trials import Driver, braking_ms, until
+from trials import RECENT_US, Driver, braking_ms, until
 
 PHONES = {"portrait": (390, 844), "landscape": (844, 390), "small": (320, 568)}
 SIZES.update(PHONES)
@@ -249,7 +249,7 @@ def test_pad_in_each_size_is_visible_with_state_and_estop(rig):
 
 def commanded(rig):
     """The newest setpoints, left and right."""
-    newest = {wheel: speed for _, wheel, speed in rig.bus.setpoints()[-8:]}
+    newest = {wheel: speed for _, wheel, speed in rig.bus.setpoints(now_us() - RECENT_US)[-8:]}
     return newest.get(LEFT, 0), newest.get(RIGHT, 0)
 
 
