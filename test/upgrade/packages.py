@@ -48,10 +48,11 @@ def build(folder, fill):
         shutil.rmtree(folder, ignore_errors=True)
         (folder / "iwheel").mkdir(parents=True)
         fill(folder / "iwheel")
-        environment = {name: value for name, value in os.environ.items() if name != "CMAKE_C_COMPILER_LAUNCHER"}
-        # Installed packages have no debug information.
-        environment.update(
+        # Installed packages have no debug information. Nobody downloads these packages.
+        environment = dict(
+            os.environ,
             LC_ALL="C.UTF-8",
+            DPKG_DEB_COMPRESSOR_TYPE="none",
             DEB_CFLAGS_STRIP="-g",
             DEB_BUILD_OPTIONS=f"nocheck noautodbgsym parallel={os.cpu_count()}",
             DEB_BUILD_PROFILES="pkg.iwheel.nomqtt pkg.iwheel.noros2 pkg.iwheel.noweb",
