@@ -24,7 +24,7 @@ import uuid
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-TOOLS = ("gcc-[0-9]+", "binutils", "cmake", "debhelper", "dpkg-dev", "scdoc")
+TOOLS = ("gcc-[0-9]+", "binutils", "cmake", "debhelper", "dpkg-dev", "ninja-build", "scdoc")
 IMAGE_TOOLS = ("gcc-arm-none-eabi", "binutils-arm-none-eabi", "cmake")
 PAGE = "usr/share/iwheel-web"
 # Files of the page from other projects: the name in scripts/web_assets, and the names in the npm package.
