@@ -62,7 +62,7 @@ def build_images():
             done = configure(folder, CPUS[board], [f"-DIWHEEL_BOARD={board}", *OPTIONS[image]])
             if done.returncode != 0:
                 raise RuntimeError(done.stderr)
-            must(["cmake", "--build", folder, "-j2"])
+            must(["cmake", "--build", folder, "-j2", "--target", f"iwheel_{board}"])
             shutil.copy(folder / f"port/stm32_stub/iwheel_{board}.elf", WORK / f"images/{board}-{image}.elf")
     # Without sanitizers: it is loaded into a Python that has none.
     must(["gcc", "-std=c11", "-O2", "-shared", "-fPIC", "-o", WORK / "libmodel.so", *(HERE / name for name in MODELS)])
