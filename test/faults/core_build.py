@@ -39,8 +39,9 @@ PATTERN = ("-ftrivial-auto-var-init=pattern",)
 # These signals are caused by the change under test; any other signal comes from outside and proves nothing.
 CRASHES = {signal.SIGILL, signal.SIGTRAP, signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGABRT, signal.SIGPIPE}
 NUMBER = "IWHEEL_MUTANT"
-# The unit test of the board sends a million hostile lines for seconds, which `unit` judges: a smaller number must be enough to detect a change.
-QUICKER = {"IWHEEL_HOSTILE_LINES": "60000"}
+# The first failed test ends its program. The unit test of the board sends a million hostile lines for seconds, which `unit` judges: a smaller
+# number must be enough to detect a change.
+QUICKER = {"IWHEEL_FIRST_FAILURE": "1", "IWHEEL_HOSTILE_LINES": "60000"}
 ENDLESS = {signal.SIGPROF, signal.SIGXCPU, signal.SIGXFSZ, signal.SIGALRM}
 # Unit tests that sweep every value run last: most changes fail an earlier one.
 SLOW = ("confirmation", "gateway_core_walk", "bit_timing", "codec_sweep", "envelope_scheduler")
@@ -91,7 +92,7 @@ def play(command, core, limit_s):
             stdout=output,
             stderr=subprocess.DEVNULL,
             cwd=core.folder,
-            env={**os.environ, "LD_LIBRARY_PATH": str(core.folder), NUMBER: str(core.number), "IWHEEL_FIRST_FAILURE": "1", **QUICKER},
+            env={**os.environ, "LD_LIBRARY_PATH": str(core.folder), NUMBER: str(core.number), **QUICKER},
             preexec_fn=limit,
         )
         _, status, usage = os.wait4(child.pid, 0)
