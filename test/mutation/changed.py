@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The functions that have changed lately: a run that judges only a sample of mutants judges theirs first."""
+"""What git knows for a run that judges only a sample of mutants: it judges those of changed functions first, and the commit selects the others."""
 
 import subprocess
 import tempfile
@@ -12,6 +12,11 @@ COMMITS = 30
 
 def git(*words):
     return subprocess.run(["git", *words], cwd=ROOT, capture_output=True, text=True, check=False).stdout
+
+
+def commit():
+    """Names the files of the commit; empty without git."""
+    return git("rev-parse", "HEAD^{tree}").strip()
 
 
 def changed_functions():
