@@ -58,7 +58,7 @@ test(idle analyzer.gpio_v2 check lint analyzer "" 5 sh -c "cmake --preset analyz
 set(analyze "cmake --build --preset arm-analyzer -j ${JOBS} && cmake --preset arm-analyzer -DIWHEEL_SETPOINT_TYPE=1 -DIWHEEL_CURRENT_ROLE=limit -DIWHEEL_TRACK_MM=540")
 test(idle analyzer.arm check lint "" arm-none-eabi-gcc 30 sh -c "cmake --preset arm-analyzer '-UIWHEEL_[B-Z]*' && ${analyze} -DIWHEEL_DEMO=ON && ${analyze} -DIWHEEL_DEMO=OFF -DIWHEEL_GATEWAY=ON && cmake --build --preset arm-analyzer -j ${JOBS}")
 test(idle eva check formal "" "" 48 test/eva/run)
-test(idle wp check+full formal "" "" 267 test/wp/run --faults $<IF:$<BOOL:${HOURS}>,all,few>)
+test(idle wp check+full formal "" "" 130 test/wp/run --faults $<IF:$<BOOL:${HOURS}>,all,few>)
 # A file that several programs compile is analysed once.
 set(once "mkdir -p build/tidy && jq 'unique_by(.file)' build/clang/compile_commands.json >build/tidy/compile_commands.json")
 test(idle tidy ci lint clang "run-clang-tidy clang-tidy clang jq" 220 sh -c "grep -q '${ROOT}/core/src/step.c' build/clang/compile_commands.json && ${once} && run-clang-tidy -quiet -p build/tidy -j ${JOBS} '^${ROOT}/(core/src|port/linux|lib|app)/'")
