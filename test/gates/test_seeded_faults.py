@@ -540,6 +540,13 @@ CASES = [
     (eva_core, "frama-c", "the core: negation of any number", "eva-negation-of-any-number", True),
     (tidy, "clang-tidy", "clean", CLEAN, False),
     (tidy, "clang-tidy", "size of the pointer", "#include <string.h>\nvoid f(int *p);\nvoid f(int *p) { memset(p, 0, sizeof(p)); }\n", True),
+    (
+        tidy,
+        "clang-tidy",
+        "second free on one path",
+        "#include <stdlib.h>\nvoid f(void *p, int a);\nvoid f(void *p, int a)\n{\n    if (a) {\n        free(p);\n    }\n    free(p);\n}\n",
+        True,
+    ),
     (tidy, "clang-tidy", "61 lines", function("    a++;\n" * 58 + "    return a;\n"), False),
     (tidy, "clang-tidy", "81 lines", function("    a++;\n" * 78 + "    return a;\n"), True),
     (tidy, "clang-tidy", "6 parameters", function("    return a;\n", "int a, int b, int c, int d, int e, int f"), True),
