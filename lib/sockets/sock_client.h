@@ -29,8 +29,8 @@
 typedef enum {
     SOCK_OPEN = 0,
     SOCK_ENDED,   ///< The client sends nothing more; complete lines from before are still executed.
-    SOCK_BROKEN,  ///< Writing fails; the received bytes are read once more for stop requests.
-    SOCK_CLOSING, ///< Nothing more is read; queued lines are sent.
+    SOCK_BROKEN,  ///< Writing fails. Only the last search for stop requests still reads.
+    SOCK_CLOSING, ///< Only the last search for stop requests still reads; queued lines are sent.
     SOCK_GONE,    ///< Neither; the slot can be freed.
 } sock_phase_t;
 
@@ -63,7 +63,7 @@ typedef struct sock_client {
     char out[SOCK_OUT_SIZE];
 } sock_client_t;
 
-/// Reads as many bytes as fit in the buffer. One system call.
+/// Reads as many bytes as fit in the buffer, if the client is OPEN. One system call.
 void sock_client_read(sock_client_t *self);
 
 /// Returns the next complete line without its newline, or NULL. It is valid until `sock_client_drop_line`.
@@ -118,7 +118,7 @@ static inline bool sock_client_is_broken(const sock_client_t *self) {
     return self->phase == SOCK_BROKEN || self->phase == SOCK_GONE;
 }
 
-/// Closes the connection after it has received its queue. Nothing more is read.
+/// Closes the connection after it has received its queue.
 void sock_client_finish(sock_client_t *self, iw_time_us_t now_us);
 
 #endif

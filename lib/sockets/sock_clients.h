@@ -102,8 +102,9 @@ enum {
 
 /// Number of lines of a closing client that are searched for stop requests.
 #define SOCK_LAST_LINES 16U
-/// Number of reads of such a client's lines that were not read before: more than the buffer of a socket in Linux.
-#define SOCK_LAST_READS 64U
+/// Number of reads of such a client's lines that were not read before. Each reads at least half of IWN_LINE_MAX while
+/// more is there, so together more than the default buffer of a socket in Linux (net.core.wmem_default, 208 KiB).
+#define SOCK_LAST_READS 128U
 
 /// Number of connections that each socket accepts in one cycle, within SOCK_ROUND_US.
 #define SOCK_ACCEPTS_PER_CYCLE 8U
@@ -140,8 +141,8 @@ void sock_service_first(sock_clients_t *self, sock_client_t *client);
 /// Sends queued lines, closes finished connections, and updates epoll, in the same order and within the same time.
 void sock_service_flush(sock_clients_t *self, iw_client_t holder);
 
-/// Executes the stop requests that were received from the client, ends its lease, and closes it after it has received its
-/// queue.
+/// Executes the client's stop requests, also those still in its socket, ends its lease, and closes it after it has
+/// received its queue.
 void sock_service_finish(sock_clients_t *self, sock_client_t *client);
 
 /// Returns true if a client waits, so that the next wait must not sleep.

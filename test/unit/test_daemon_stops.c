@@ -400,6 +400,22 @@ TEST(test_stop_behind_other_lines_of_a_client_that_has_gone) {
     }
 }
 
+/// One line and a part of the next fit into the buffer: each read gains one line.
+TEST(test_stop_behind_70_long_lines_of_a_client_that_has_gone) {
+    static char lines[150000];
+    size_t length = 0;
+    begin_driving();
+    const int fd = knock(SOCK_DRIVE);
+    daemon_rig_run(2);
+    for (unsigned i = 0; i < 70U; i++) {
+        length +=
+            (size_t)snprintf(&lines[length], sizeof lines - length, "{\"cmd\":\"status\",\"pad\":\"%02040d\"}\n", 0);
+    }
+    send_lines(fd, strcat(lines, stops[0]));
+    (void)close(fd);
+    assert_slower("70 long lines");
+}
+
 TEST(test_stop_in_a_stop_place_names_its_process) {
     char who[64];
     take_all_places();
