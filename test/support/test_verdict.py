@@ -41,6 +41,9 @@ FAULTS = (
     ("one stall seen on two processors counts twice", "if spans and begin_us <= spans[-1][1]:", "if False:"),
     ("the gateway's own report is enough", "claims=[(now_us()", "stalls=[(now_us()"),
     ("the gateway's own report is ignored", "[*stalls, *claims]", "stalls"),
+    ("the gateway's own report explains any time", "stalls if need_us >= LONG_US else", "stalls if False else"),
+    ("a limit missed by far in every attempt is skipped", "FAILED if far == RETRIES else verdict", "verdict"),
+    ("a limit missed by far once fails", "FAILED if far == RETRIES else verdict", "FAILED if far else verdict"),
     ("a conclusive failure is repeated", "if verdict == INCONCLUSIVE:\n                undecided", "if verdict != PASSED:\n                undecided"),
     ("the last attempt counts as passed", "self.counts[SKIPPED if verdict == INCONCLUSIVE", "self.counts[PASSED if verdict == INCONCLUSIVE"),
     ("repeated until it passes", "if verdict != INCONCLUSIVE:\n                break", "if verdict == PASSED:\n                break"),
@@ -200,6 +203,18 @@ class Inconclusive(unittest.TestCase):
         self.assertEqual(["1 inconclusive, counted as skipped: one", "3 passed, 0 failed, 1 skipped"], lines)
         words = "inconclusive in each of 4 attempts: the machine stalled for up to 123 ms; the last failure: it was wrong"
         self.assertEqual(("inconclusive", words, 4), made.printed["one"])
+
+    def test_limit_missed_by_far_in_every_attempt_alone_fails(self):
+        far, near = bad(verdict.TIMING, at_us=AT_US, need_us=250_000), bad(verdict.TIMING, at_us=AT_US, need_us=50_000)
+        for attempts, expected in (([near, far, far, far], "failed"), ([far, far, near, far], "inconclusive"), ([far, ok()], "passed")):
+            made = Made({"one": attempts}, [stall(300_000)])
+            made.run()
+            self.assertEqual(expected, made.printed["one"][0])
+
+    def test_gateway_late_by_far_is_no_reason(self):
+        far = bad(verdict.TIMING, at_us=AT_US, need_us=250_000)._replace(claims=[(AT_US, 300_000)])
+        status, _, made = Made({"one": [far, ok()]}, [stall(6_000)]).run()
+        self.assertEqual((1, 1), (status, made["one"]))
 
     def test_gist_of_a_traceback_is_its_error(self):
         text = "Traceback (most recent call last):\n  File ...\nAssertionError: 3 != 4\niwheel-gateway: info: state: armed\n"

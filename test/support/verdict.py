@@ -9,7 +9,7 @@
             --TIMING, CHECK: a measured stall can have caused each of them-----> INCONCLUSIVE
 
 An inconclusive test runs again, alone, at most RETRIES times, until an attempt is conclusive. If none is, the test counts as skipped; its
-name and the stall are printed. The module does not depend on a runner: a runner passes one function that makes an attempt and one that prints a verdict.
+name and the stall are printed. But if each of these attempts misses a limit by LONG_US, it has failed: a program can be the cause of such stalls. The module does not depend on a runner: a runner passes one function that makes an attempt and one that prints a verdict.
 
     verdict.py --run NAME COMMAND...    the same for a command that is a test
 """
@@ -33,6 +33,7 @@ RETRIES = 3
 NOT_JUDGED = 75  # exit status: more than a quarter of the tests is inconclusive
 LATE_US = 5_000  # a sleeper that wakes later than this has measured a stall
 CHECK_US = 20_000  # a shorter stall changes no decision of the gateway (IW_GATEWAY_LATE_US), so it explains no failed check
+LONG_US = 200_000  # only measured stalls explain a limit that was missed by more
 BEFORE_US, AFTER_US = 400_000, 50_000  # a stall this near to a failure may have caused it
 QUIET_US, PATIENCE_S, POLL_S = 1_000_000, 10, 0.1  # before a test runs again
 PROCESSORS_MAX = 4
@@ -142,8 +143,8 @@ def explains(failure, stalls, claims=()):
     """True if these stalls, all near enough in time, can have caused the failure."""
     if failure.kind not in (TIMING, CHECK) or not stalls:
         return False
-    spans = spans_us([*stalls, *claims])
     need_us = CHECK_US if failure.need_us is None else failure.need_us
+    spans = spans_us(stalls if need_us >= LONG_US else [*stalls, *claims])
     return (sum(spans) if failure.at_us else max(spans)) >= need_us
 
 
@@ -216,13 +217,15 @@ class Session:
         return self.verdict_of(attempt), attempt
 
     def again(self, name):
-        """(verdict, attempt, number of attempts): repeats an inconclusive test, alone, until an attempt is conclusive."""
+        """(verdict, attempt, number of attempts): repeats an inconclusive test, alone, until an attempt is conclusive or all missed a limit by far."""
+        far = 0  # Attempts that miss a limit by far.
         for tries in range(1, RETRIES + 1):  # noqa: B007
             self.await_quiet()
             verdict, attempt = self.once(name)
             if verdict != INCONCLUSIVE:
                 break
-        return verdict, attempt, tries
+            far += any((failure.need_us or 0) >= LONG_US for failure in attempt.failures)
+        return FAILED if far == RETRIES else verdict, attempt, tries
 
     def stall_ms(self, attempt):
         """The longest stall measured during the attempt."""

@@ -26,11 +26,11 @@ def crash(t, number):
     stream.stop()
     answered_ms = rig.start_gateway(wheels=False, restart_hold=True)
     limit_ms = rig.restart_us / 1000
-    t.check(answered_ms <= limit_ms, f"answers {answered_ms:.0f} ms after the restart, {limit_ms:.0f} ms allowed", True)
+    t.check(answered_ms <= limit_ms, f"answers {answered_ms:.0f} ms after the restart, {limit_ms:.0f} ms allowed", True, need_us=(answered_ms - limit_ms) * 1000)
     observer = rig.client("observer")
     time.sleep(0.3)
     again = rig.bus.setpoints(killed_us + 20_000)
-    t.check(again and again[0][0] - killed_us < 2 * rig.restart_us, "zeros soon after the restart")
+    t.check(again and again[0][0] - killed_us < rig.restart_us + 300_000, "zeros soon after the restart")
     t.rule(not any(speed for _, _, speed in again), f"nothing but zeros after the restart: {again[:3]}")
     t.figure(f"answers after {answered_ms:.0f} ms, zeros {(again[0][0] - killed_us) / 1000 if again else 0:.0f} ms after the kill")
     t.check(observer.request("status")["cause"] == "restart", "the cause is the restart")
