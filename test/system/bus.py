@@ -68,11 +68,14 @@ class Bus:
     def send(self, can_id, data=b"", length=None):
         self.socket.send(FRAME.pack(can_id, len(data) if length is None else length, 0, 0, data.ljust(8, b"\0")))
 
+    def first_since(self, since_us):
+        """Index before which no frame is that new."""
+        return bisect.bisect_left(self.frames, since_us - ORDERED_US, key=lambda frame: frame.t_us)
+
     def setpoints(self, since_us=0):
         """The gateway's setpoints as (t_us, id, mm/s)."""
         frames = self.frames
-        begin = bisect.bisect_left(frames, since_us - ORDERED_US, key=lambda frame: frame.t_us)
-        return [(f.t_us, f.id, signed(f.data, 1)) for f in frames[begin:] if f.id in (266, 298) and not f.own and f.t_us >= since_us and len(f.data) >= 3]
+        return [(f.t_us, f.id, signed(f.data, 1)) for f in frames[self.first_since(since_us) :] if f.id in (266, 298) and not f.own and f.t_us >= since_us and len(f.data) >= 3]
 
     def speed_rpm(self, side):
         """The wheel's last speed frame."""

@@ -3,6 +3,7 @@
 
 import contextlib
 import json
+import math
 import os
 import re
 import threading
@@ -248,9 +249,9 @@ def test_pad_in_each_size_is_visible_with_state_and_estop(rig):
 
 
 def commanded(rig):
-    """The newest setpoints, left and right."""
+    """The newest setpoints, left and right; no number for a wheel that was sent none for a second."""
     newest = {wheel: speed for _, wheel, speed in rig.bus.setpoints(now_us() - RECENT_US)[-8:]}
-    return newest.get(LEFT, 0), newest.get(RIGHT, 0)
+    return newest.get(LEFT, math.nan), newest.get(RIGHT, math.nan)
 
 
 @pytest.mark.rig(driving=True)
