@@ -15,7 +15,7 @@ def git(*words):
 
 
 def commit():
-    """Names the files of the commit; empty without git."""
+    """Names the tree of the commit; empty without git."""
     return git("rev-parse", "HEAD^{tree}").strip()
 
 

@@ -23,7 +23,7 @@ ASSETS = Path(os.environ.get("IWHEEL_WEB_ASSETS") or Path(os.environ.get("XDG_CA
 
 @functools.cache
 def browser():
-    """One for each test: all of its pages, in contexts of their own, run in it until the test's process ends."""
+    """One for each process, so for each test: all of its pages, in contexts of their own, run in it until the test's process ends."""
     try:
         from playwright.sync_api import sync_playwright
     except ImportError as error:
