@@ -668,8 +668,10 @@ def test_page_is_accessible_and_fits_each_theme_and_screen(rig):
 
 
 def mouse_on_stop(page, kind):
-    """Presses or releases the mouse where STOP is on the screen. Returns the time just before."""
-    at = page.evaluate("""() => { const b = document.querySelector('#stop').getBoundingClientRect(), v = visualViewport;
+    """Presses or releases the mouse where STOP is on the screen after the next frame. Returns the time just before."""
+    at = page.evaluate("""async () => {
+        await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))); // The page places STOP once per frame.
+        const b = document.querySelector('#stop').getBoundingClientRect(), v = visualViewport;
         return [b.left + b.width / 2 - v.offsetLeft, b.top + b.height / 2 - v.offsetTop, v.width, v.height]; }""")
     assert 0 < at[0] < at[2] and 0 < at[1] < at[3], f"STOP is not on the screen: {at}"
     session, since = page.context.new_cdp_session(page), now_us()
