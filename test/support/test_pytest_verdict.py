@@ -360,7 +360,7 @@ class Inconclusive(Made):
             """)
 
     def test_collected_check_is_not_judged(self):
-        self.repeated('def test_one(t):\n    note("tried")\n    t.failures.append(verdict.Failure("late", verdict.TIMING, 0, 400_000))\n')
+        self.repeated('def test_one(t):\n    note("tried")\n    t.failures.append(verdict.Failure("late", verdict.TIMING, 0, 150_000))\n')
 
     def test_stall_that_the_test_measured_counts(self):
         self.repeated(
