@@ -9,7 +9,8 @@
             --TIMING, CHECK: a measured stall can have caused each of them-----> INCONCLUSIVE
 
 An inconclusive test runs again, alone, at most RETRIES times, until an attempt is conclusive. If none is, the test counts as skipped; its
-name and the stall are printed. But if each of these attempts misses a limit by LONG_US, it has failed: a program can be the cause of such stalls. The module does not depend on a runner: a runner passes one function that makes an attempt and one that prints a verdict.
+name and the stall are printed. But if each of these attempts misses a limit by LONG_US, it has failed: a program can be the cause of such stalls.
+The module does not depend on a runner: a runner passes one function that makes an attempt and one that prints a verdict.
 
     verdict.py --run NAME COMMAND...    the same for a command that is a test
 """

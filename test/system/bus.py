@@ -75,7 +75,11 @@ class Bus:
     def setpoints(self, since_us=0):
         """The gateway's setpoints as (t_us, id, mm/s)."""
         frames = self.frames
-        return [(f.t_us, f.id, signed(f.data, 1)) for f in frames[self.first_since(since_us) :] if f.id in (266, 298) and not f.own and f.t_us >= since_us and len(f.data) >= 3]
+        return [
+            (f.t_us, f.id, signed(f.data, 1))
+            for f in frames[self.first_since(since_us) :]
+            if f.id in (266, 298) and not f.own and f.t_us >= since_us and len(f.data) >= 3
+        ]
 
     def speed_rpm(self, side):
         """The wheel's last speed frame."""

@@ -26,7 +26,9 @@ def crash(t, number):
     stream.stop()
     answered_ms = rig.start_gateway(wheels=False, restart_hold=True)
     limit_ms = rig.restart_us / 1000
-    t.check(answered_ms <= limit_ms, f"answers {answered_ms:.0f} ms after the restart, {limit_ms:.0f} ms allowed", True, need_us=(answered_ms - limit_ms) * 1000)
+    t.check(
+        answered_ms <= limit_ms, f"answers {answered_ms:.0f} ms after the restart, {limit_ms:.0f} ms allowed", True, need_us=(answered_ms - limit_ms) * 1000
+    )
     observer = rig.client("observer")
     time.sleep(0.3)
     again = rig.bus.setpoints(killed_us + 20_000)
