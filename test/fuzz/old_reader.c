@@ -369,12 +369,14 @@ bool old_request_read(const char *line, size_t length, iwn_request_t *out_reques
     }
     const bool known = read_cmd(root, &out_request->cmd, out_refusal);
     const bool good = read_id(root, &out_request->id, out_refusal);
-    if (!known || !(good || is_stop(out_request)) || !read_fields(root, out_request, out_refusal) ||
-        !(is_stop(out_request) || is_complete(root, out_request, out_refusal))) {
+    if (!known || !(good || is_stop(out_request)) || !read_fields(root, out_request, out_refusal)) {
         return false;
     }
     if (is_stop(out_request)) {
         return true; // Its other fields are ignored.
+    }
+    if (!is_complete(root, out_request, out_refusal)) {
+        return false;
     }
     out_request->has_current = json_object_get(root, "left_mA") != NULL;
     out_request->has_commit = json_object_get(root, "commit") != NULL;

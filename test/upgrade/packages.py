@@ -48,7 +48,7 @@ def build(folder, fill):
         shutil.rmtree(folder, ignore_errors=True)
         (folder / "iwheel").mkdir(parents=True)
         fill(folder / "iwheel")
-        # Installed packages have no debug information. Nobody downloads these packages.
+        # Installed packages have no debug information. These packages are never downloaded.
         environment = dict(
             os.environ,
             LC_ALL="C.UTF-8",
