@@ -7,7 +7,7 @@
 
 /// Shares are in 1/2^16.
 #define SHARE_ONE 65536U
-/// Longest time between two steps that counts. Later steps are late and do not compare.
+/// Longest time between two comparisons that counts. It is longer after a late step, which compares nothing.
 #define ELAPSED_MAX_US 50000U
 /// Speeds and deviations are limited to these values, far above every configurable value.
 #define SPEED_MAX_MM_S 40000

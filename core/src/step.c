@@ -292,10 +292,10 @@ static void watch_follow(iw_gateway_t *self, size_t side, int32_t applied_mm_s) 
 static void watch_wheel(iw_gateway_t *self, size_t side, int32_t applied_mm_s) {
     const iw_state_t state = iw_permit_state(&self->permit);
     const bool ours = state == IW_STATE_ARMED || state == IW_STATE_STOPPING;
-    if (ours && iw_wheel_online(&self->wheel[side], self->now_us)) {
-        watch_follow(self, side, applied_mm_s);
-    } else {
+    if (!ours) {
         iw_follow_restart(&self->follow[side]);
+    } else if (iw_wheel_online(&self->wheel[side], self->now_us)) {
+        watch_follow(self, side, applied_mm_s);
     }
 }
 
@@ -324,10 +324,10 @@ static void judge_wheels(iw_gateway_t *self) {
     const bool online =
         iw_wheel_online(&self->wheel[IW_LEFT], self->now_us) && iw_wheel_online(&self->wheel[IW_RIGHT], self->now_us);
     const iw_pair_t applied = iw_setpoint_applied(&self->setpoint);
-    // A stalled step neither raises nor clears causes that depend on an age: the next step on time decides (R7).
+    // A stalled step neither raises nor clears causes that depend on an age: the next step on time decides (R7). It also
+    // removes no evidence against a wheel that does not follow: steps that are often late would hide the fault.
     if (self->stalled) {
         iw_permit_retain_present(&self->permit);
-        iw_diverge_restart(&self->diverge, self->now_us);
     } else {
         watch_echo(self);
         if (!online) { // A wheel that is online is not lost.

@@ -29,12 +29,16 @@ static bool has_ended(const iw_gateway_t *self) {
     return demand < IW_DEMAND_BRAKE || (demand == IW_DEMAND_BRAKE && iw_setpoint_is_zero(&self->setpoint));
 }
 
+static bool is_lost(const iw_gateway_t *self) {
+    return iw_wheel_lost(&self->wheel[IW_LEFT], self->now_us) || iw_wheel_lost(&self->wheel[IW_RIGHT], self->now_us);
+}
+
 void iw_watch_pair(iw_gateway_t *self, const iw_pair_t *applied, bool online) {
     iw_diverge_t *const diverge = &self->diverge;
     iw_diverge_begin(diverge, self->permit.armed_us);
-    if (has_ended(self) || !online || self->setpoint.from_zero) {
+    if (has_ended(self) || self->setpoint.from_zero || (!online && is_lost(self))) {
         iw_diverge_restart(diverge, self->now_us);
-    } else {
+    } else if (online) { // A wheel that is offline only because of a late step removes no evidence against it.
         compare(self, applied);
     }
 }
@@ -54,7 +58,6 @@ static void excuse(iw_gateway_t *self, iw_side_t side, iw_time_us_t before_us) {
     if (!iw_wheel_lost(&self->wheel[side], before_us)) {
         iw_wheel_excuse(&self->wheel[side], self->now_us);
     }
-    iw_follow_restart(&self->follow[side]);
 }
 
 void iw_watch_excuse(iw_gateway_t *self) {

@@ -104,10 +104,14 @@ static int64_t difference_um_s(const oracle_t *self, size_t side) {
     return self->config->invert[side] ? -away : away;
 }
 
-/// A machine that turns on its own: judged without any lag, so only at a large distance.
-static void judge_pair_path(oracle_t *self, iw_time_us_t now_us, bool comparable) {
+/// A machine that turns on its own: judged without any lag, so only at a large distance. A late step adds nothing to the
+/// distance and removes nothing.
+static void judge_pair_path(oracle_t *self, iw_time_us_t now_us, bool comparable, bool late) {
     const int64_t elapsed_us = (int64_t)(now_us - self->path_at_us);
     self->path_at_us = now_us;
+    if (!comparable && late) {
+        return;
+    }
     if (!comparable || elapsed_us > (int64_t)LATE_STEP_US) {
         self->path_nm = 0;
         return;
@@ -135,7 +139,9 @@ static void judge_wheels(oracle_t *self, iw_time_us_t now_us) {
         const bool known = wheel->fresh_us != IW_NEVER && !oracle_elapsed(now_us, wheel->fresh_us, silent_us);
         comparable = comparable && known;
         offline += silent ? 1U : 0U;
-        judge_following(self, now_us, side, ours && known && !self->stalled);
+        if (!ours || silent || (known && !self->stalled)) { // Otherwise the next step on time decides.
+            judge_following(self, now_us, side, ours && known);
+        }
         if (!ours || self->stalled) {
             continue;
         }
@@ -148,7 +154,7 @@ static void judge_wheels(oracle_t *self, iw_time_us_t now_us) {
                          (unsigned long long)(now_us - wheel->waiting[0]));
         }
     }
-    judge_pair_path(self, now_us, comparable);
+    judge_pair_path(self, now_us, comparable, ours && offline == 0U);
     // One offline wheel may ramp; with both offline only zero may follow.
     if (offline == IW_SIDES && !self->stalled) {
         oracle_hard_stop(self);

@@ -3,6 +3,8 @@
 #include "gateway_rig.h"
 #include "unit.h"
 
+#include <stdio.h>
+
 static gateway_rig_t rig;
 
 void setUp(void) {
@@ -255,4 +257,75 @@ TEST(test_gateway_drive_that_waited_does_not_set_stale_time_back) {
     const iw_time_us_t last_us = rig.gateway.permit.stale_us;
     (void)drive_sent(last_us - MS(100));
     TEST_ASSERT_EQUAL_UINT64(last_us, rig.gateway.permit.stale_us);
+}
+
+// Wheels that do not follow while steps are often late ------------------------------------------------------------------
+
+typedef struct {
+    const char *name;
+    iw_cause_t cause;
+    int32_t commanded_mm_s;
+    int16_t rpm[IW_SIDES]; ///< OBEYS: as commanded.
+} fault_t;
+
+enum { OBEYS = INT16_MAX };
+
+static const fault_t faults[] = {
+    {"left wheel blocked", IW_CAUSE_PAIR_DIVERGES, 400, {0, OBEYS}},
+    {"left wheel at 75 %", IW_CAUSE_PAIR_DIVERGES, 800, {30, OBEYS}},
+    {"right wheel backwards", IW_CAUSE_PAIR_DIVERGES, 400, {OBEYS, -20}},
+    {"both too fast", IW_CAUSE_OVERSPEED, 400, {45, 45}},
+    {"both backwards", IW_CAUSE_FEEDBACK_SIGN, 400, {-20, -20}},
+    {"both blocked", IW_CAUSE_WHEEL_BLOCKED, 400, {0, 0}},
+};
+
+/// Drives, with one step of `late_ms` in each `every_ms`, until something stops the wheels, at most for `for_ms`.
+static void cruise_often_late(int32_t left_mm_s, int32_t right_mm_s, uint32_t late_ms, uint32_t every_ms,
+                              uint32_t for_ms) {
+    const iw_time_us_t until_us = rig.now_us + MS(for_ms);
+    while (rig.now_us < until_us && iw_gateway_state(&rig.gateway) == IW_STATE_ARMED) {
+        (void)gateway_rig_cruise(&rig, left_mm_s, right_mm_s, MS(every_ms - late_ms));
+        stall_by(MS(late_ms));
+    }
+}
+
+TEST(test_gateway_often_late_detects_each_wheel_that_does_not_follow) {
+    static const struct {
+        uint32_t late_ms, every_ms;
+    } rates[] = {{25, 50}, {25, 100}, {25, 300}, {60, 100}, {60, 300}, {99, 130}, {99, 300}};
+    for (size_t i = 0; i < sizeof faults / sizeof *faults; i++) {
+        for (size_t k = 0; k < sizeof rates / sizeof *rates; k++) {
+            char words[80];
+            const int32_t mm_s = faults[i].commanded_mm_s;
+            (void)snprintf(words, sizeof words, "%s, %u ms late in each %u ms", faults[i].name,
+                           (unsigned)rates[k].late_ms, (unsigned)rates[k].every_ms);
+            setUp();
+            gateway_rig_arm(&rig);
+            (void)gateway_rig_cruise(&rig, mm_s, mm_s, MS(1500));
+            for (size_t side = 0; side < IW_SIDES; side++) {
+                rig.wheel[side].rpm_fixed = faults[i].rpm[side] != OBEYS;
+                rig.wheel[side].rpm = faults[i].rpm[side];
+            }
+            const iw_time_us_t since_us = rig.now_us;
+            cruise_often_late(mm_s, mm_s, rates[k].late_ms, rates[k].every_ms, 4000);
+            TEST_ASSERT_EQUAL_INT_MESSAGE(faults[i].cause, rig.gateway.permit.stop.cause, words);
+            TEST_ASSERT_LESS_THAN_UINT64_MESSAGE(MS(1500), rig.now_us - since_us, words);
+            tearDown();
+        }
+    }
+}
+
+TEST(test_gateway_often_late_does_not_stop_wheels_that_follow) {
+    static const int32_t pairs[][IW_SIDES] = {{800, 800}, {-600, -600}, {300, -300}, {0, 500}, {-200, 200}, {40, 40}};
+    static const uint32_t late_ms[] = {25, 60, 99};
+    for (size_t k = 0; k < sizeof late_ms / sizeof *late_ms; k++) {
+        setUp();
+        gateway_rig_arm(&rig);
+        for (size_t i = 0; i < 3U * sizeof pairs / sizeof *pairs; i++) {
+            const int32_t *const pair = pairs[i % (sizeof pairs / sizeof *pairs)];
+            cruise_often_late(pair[IW_LEFT], pair[IW_RIGHT], late_ms[k], late_ms[k] + 30U, 1000);
+            TEST_ASSERT_EQUAL_INT_MESSAGE(IW_STATE_ARMED, iw_gateway_state(&rig.gateway), "it stopped");
+        }
+        tearDown();
+    }
 }

@@ -181,7 +181,7 @@ TEST(test_gateway_hold_ends_after_a_minute_with_a_rolling_wheel) {
     TEST_ASSERT_EQUAL_UINT32(1, rig.gateway.permit.still_moving);
 }
 
-TEST(test_gateway_late_step_restarts_the_comparison_of_speeds) {
+TEST(test_gateway_late_step_continues_the_comparison_of_speeds) {
     gateway_rig_begin_apart(&rig);
     drive_on();
     (void)gateway_rig_cruise(&rig, 120, 120, MS(500));
@@ -189,7 +189,6 @@ TEST(test_gateway_late_step_restarts_the_comparison_of_speeds) {
     rig.wheel[IW_RIGHT].rpm = -6;
     (void)gateway_rig_cruise(&rig, 120, 120, MS(250));
     gateway_rig_stall(&rig, rig.wake_us - rig.now_us + MS(21)); // The wheel is still online.
-    (void)gateway_rig_cruise(&rig, 120, 120, MS(280));
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
     (void)gateway_rig_cruise(&rig, 120, 120, MS(60));
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_FEEDBACK_SIGN, rig.gateway.permit.stop.cause);

@@ -130,16 +130,26 @@ TEST(test_gateway_pair_with_immediate_zero_is_not_compared) {
     TEST_ASSERT_TRUE(rig.gateway.permit.seen_us[IW_CAUSE_PAIR_DIVERGES] == IW_NEVER);
 }
 
-TEST(test_gateway_deviation_is_reset_while_a_wheel_is_not_online) {
-    rig.config.wheel_silent_ms = 200;
-    gateway_rig_begin(&rig, false);
-    drive_on();
-    turn(IW_LEFT, 0);
-    (void)gateway_rig_cruise(&rig, 400, 400, MS(50));
-    TEST_ASSERT_GREATER_THAN_INT32(20000, rig.gateway.diverge.path_um);
-    rig.wheel[IW_LEFT].mute = true;
-    gateway_rig_stall(&rig, rig.wake_us - rig.now_us + MS(90)); // Excused for a short time, and not online
-    TEST_ASSERT_EQUAL_INT32(0, rig.gateway.diverge.path_um);
+/// A wheel that a late step made offline has its deviation again with its next frame; a lost one begins at zero.
+TEST(test_gateway_deviation_is_reset_by_a_lost_wheel_not_by_a_late_step) {
+    for (int side = 0; side < IW_SIDES; side++) {
+        setUp();
+        drive_on();
+        turn((iw_side_t)side, 0);
+        (void)gateway_rig_cruise(&rig, 400, 400, MS(50));
+        const int32_t path_um = rig.gateway.diverge.path_um;
+        TEST_ASSERT_TRUE(path_um > 20000 || path_um < -20000);
+        rig.wheel[side].mute = true;
+        gateway_rig_stall(&rig, rig.wake_us - rig.now_us + MS(90));
+        TEST_ASSERT_FALSE(iw_wheel_online(&rig.gateway.wheel[side], rig.now_us));
+        TEST_ASSERT_EQUAL_INT32(path_um, rig.gateway.diverge.path_um);
+        gateway_rig_run(&rig, MS(20)); // Not online, and not late.
+        TEST_ASSERT_EQUAL_INT32(path_um, rig.gateway.diverge.path_um);
+        gateway_rig_run(&rig, MS(100));
+        TEST_ASSERT_EQUAL_INT(IW_CAUSE_WHEEL_LOST, stop()->cause);
+        TEST_ASSERT_EQUAL_INT32(0, rig.gateway.diverge.path_um);
+        tearDown();
+    }
 }
 
 TEST(test_gateway_wheel_offline_is_not_compared_by_its_old_speed) {

@@ -39,7 +39,7 @@ typedef struct {
 /// Initializes `self`. `config` must be checked, and must exist as long as `self`.
 void iw_follow_init(iw_follow_t *self, const iw_config_t *config);
 
-/// Stops all timers while nothing is compared: the core does not drive, or a step is late.
+/// Stops all timers, while the core does not drive.
 static inline void iw_follow_restart(iw_follow_t *self) {
     self->running = 0;
 }
