@@ -55,12 +55,6 @@ static void adopt(iw_force_t *self, iw_time_us_t now_us, iw_offset_provenance_t 
     self->offset_us = now_us;
 }
 
-void iw_force_restore(iw_force_t *self, iw_offset_provenance_t provenance, int32_t offset_mN) {
-    if (self->provenance < provenance || self->provenance == IW_OFFSET_STORED) {
-        adopt(self, IW_NEVER, provenance, offset_mN);
-    }
-}
-
 /// Integer square root, bit by bit: the core has neither floating point nor libm.
 static uint32_t square_root(uint32_t value) {
     uint32_t root = 0;
@@ -166,13 +160,37 @@ static void judge_unit(iw_force_t *self) {
     }
 }
 
+/// Returns true if the wheel may have measured a person who leaned on it: nobody saw its start, and its offset differs
+/// from the stored one as by a load.
+static bool may_be_load(const iw_force_t *self) {
+    return !self->boot_seen && self->provenance == IW_OFFSET_STORED &&
+           far_from_offset(self, self->wheel_offset_dN * 100, IW_FORCE_SHIFT_mN);
+}
+
 /// Uses the wheel's offset, unless the window shows a load during its measurement ("only has sense if you don't apply
-/// any force to the shaft during the first two seconds"). If the start was not observed, the offset is used.
-static void settle(iw_force_t *self, iw_time_us_t now_us) {
+/// any force to the shaft during the first two seconds"). If the start was not observed, a stored offset far from it
+/// stays in use, and the force is doubtful until a tare.
+static IW_APART void settle(iw_force_t *self, iw_time_us_t now_us) {
     const bool trusted = !self->boot_seen || self->quality.window == IW_WINDOW_GOOD;
     judge_unit(self);
-    if (self->wheel_offset_received && trusted && self->provenance < IW_OFFSET_OPERATOR) {
+    if (!self->wheel_offset_received || !trusted || self->provenance == IW_OFFSET_OPERATOR) {
+        return;
+    }
+    if (!may_be_load(self)) {
         adopt(self, now_us, IW_OFFSET_WHEEL, self->wheel_offset_dN * 100);
+    } else {
+        self->observation = IW_UNIT_UNCLEAR;
+    }
+}
+
+void iw_force_restore(iw_force_t *self, iw_offset_provenance_t provenance, int32_t offset_mN) {
+    // The wheel's offset may have come before the answer of the store: then settle compares the two now.
+    if (self->provenance == IW_OFFSET_WHEEL && !self->boot_seen) {
+        self->provenance = IW_OFFSET_NONE;
+    }
+    if (self->provenance < provenance || self->provenance == IW_OFFSET_STORED) {
+        adopt(self, IW_NEVER, provenance, offset_mN);
+        settle(self, IW_NEVER);
     }
 }
 

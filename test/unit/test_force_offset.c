@@ -92,6 +92,36 @@ TEST(test_force_restore_does_not_replace_an_offset_of_this_run) {
     assert_offset(IW_OFFSET_OPERATOR, 100);
 }
 
+TEST(test_force_unseen_wheel_offset_is_doubted_beyond_5_N) {
+    for (int order = 0; order < 2; order++) { // The stored offset comes first or last.
+        for (int32_t stored_mN = -1; stored_mN <= 0; stored_mN++) {
+            setUp();
+            force_rig_hear(&rig, 0, true);
+            if (order == 1) {
+                force_rig_offset(&rig, 50);
+                assert_offset(IW_OFFSET_WHEEL, 5000);
+            }
+            iw_force_restore(&rig.force, IW_OFFSET_STORED, stored_mN);
+            if (order == 0) {
+                force_rig_offset(&rig, 50);
+            }
+            const bool near = stored_mN == 0;
+            assert_offset(near ? IW_OFFSET_WHEEL : IW_OFFSET_STORED, near ? 5000 : stored_mN);
+            TEST_ASSERT_EQUAL_INT(near ? IW_FORCE_VALID : IW_FORCE_OFFSET_DOUBTED, force_rig_validity(&rig));
+        }
+    }
+}
+
+TEST(test_force_seen_wheel_offset_is_not_replaced_by_a_stored_one) {
+    force_rig_quiet(&rig, 40, 510);
+    iw_force_reopen(&rig.force, true);
+    force_rig_quiet(&rig, 40, 510);
+    force_rig_offset(&rig, 51);
+    assert_offset(IW_OFFSET_WHEEL, 5100);
+    iw_force_restore(&rig.force, IW_OFFSET_STORED, 90000);
+    assert_offset(IW_OFFSET_WHEEL, 5100);
+}
+
 TEST(test_force_restored_tare_is_replaced_by_the_next_tare_only) {
     iw_force_restore(&rig.force, IW_OFFSET_OPERATOR, 5000);
     assert_offset(IW_OFFSET_OPERATOR, 5000);

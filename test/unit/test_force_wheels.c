@@ -132,6 +132,47 @@ TEST(test_force_unobserved_loaded_start_is_doubted_without_load) {
     TEST_ASSERT_EQUAL_INT(IW_FORCE_VALID, validity(IW_LEFT));
 }
 
+/// Wheels and gateway share a switch, and a person leans on the machine while it starts.
+TEST(test_force_unobserved_loaded_start_retains_the_stored_offset) {
+    for (unsigned before_ms = 0; before_ms <= SECOND; before_ms += SECOND) { // The store may answer late.
+        world_rig_begin(&rig, 0);
+        sim_world_power(&rig.world, rig.now_us, false);
+        load_both(150000);
+        world_rig_run(&rig, 2U * SECOND);
+        sim_world_power(&rig.world, rig.now_us, true);
+        world_rig_run(&rig, 10U * SECOND);
+        world_rig_restart(&rig);
+        world_rig_run(&rig, before_ms);
+        TEST_ASSERT_TRUE(before_ms == 0U || force(IW_LEFT)->provenance == IW_OFFSET_WHEEL);
+        iw_gateway_restore_offset(&rig.gateway, IW_LEFT, IW_OFFSET_STORED, LEFT_ZERO_mN);
+        world_rig_run(&rig, 4U * SECOND);
+        TEST_ASSERT_FALSE(force(IW_LEFT)->boot_seen);
+        TEST_ASSERT_INT32_WITHIN(120, 1623, force(IW_LEFT)->wheel_offset_dN);
+        assert_zero(IW_LEFT, IW_OFFSET_STORED, LEFT_ZERO_mN);
+        TEST_ASSERT_INT32_WITHIN(12000, 150000, iw_force_net_mN(force(IW_LEFT)));
+        TEST_ASSERT_EQUAL_INT(IW_FORCE_OFFSET_DOUBTED, validity(IW_LEFT));
+        TEST_ASSERT_EQUAL_INT(IW_OFFSET_WHEEL, force(IW_RIGHT)->provenance); // Nothing is known that contradicts it.
+        load_both(0);
+        world_rig_run(&rig, 90U * SECOND);
+        assert_zero(IW_LEFT, IW_OFFSET_STORED, LEFT_ZERO_mN);
+        TEST_ASSERT_INT32_WITHIN(1000, 0, iw_force_net_mN(force(IW_LEFT)));
+        assert_tare(IW_TARE_OK, IW_LEFT);
+        TEST_ASSERT_EQUAL_INT(IW_FORCE_VALID, validity(IW_LEFT));
+    }
+}
+
+TEST(test_force_unobserved_start_without_load_uses_the_wheels_offset) {
+    world_rig_begin(&rig, 0);
+    world_rig_run(&rig, 10U * SECOND);
+    world_rig_restart(&rig);
+    iw_gateway_restore_offset(&rig.gateway, IW_LEFT, IW_OFFSET_STORED, LEFT_ZERO_mN + 4000);
+    iw_gateway_restore_offset(&rig.gateway, IW_RIGHT, IW_OFFSET_STORED, RIGHT_ZERO_mN - 4000);
+    world_rig_run(&rig, 4U * SECOND);
+    assert_zero(IW_LEFT, IW_OFFSET_WHEEL, LEFT_ZERO_mN);
+    assert_zero(IW_RIGHT, IW_OFFSET_WHEEL, RIGHT_ZERO_mN);
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_VALID, validity(IW_LEFT));
+}
+
 TEST(test_force_offset_after_reboot_is_stored_then_of_the_wheel) {
     world_rig_begin(&rig, 0);
     world_rig_run(&rig, 90U * SECOND);

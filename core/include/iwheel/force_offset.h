@@ -147,7 +147,8 @@ void iw_force_init(iw_force_t *self, iw_force_unit_t unit);
 void iw_force_reopen(iw_force_t *self, bool boot_seen);
 
 /// Restores an offset of an earlier run, unless this run has a better one. `provenance` IW_OFFSET_OPERATOR restores a
-/// tare, which only the next tare replaces; any other value restores IW_OFFSET_STORED, which every offset replaces.
+/// tare, which only the next tare replaces; any other value restores IW_OFFSET_STORED, which every offset replaces,
+/// except one of the wheel that differs by more than IW_FORCE_SHIFT_mN if the start of the wheel was not observed.
 /// Sets `offset_us` to IW_NEVER. `offset_mN` is within +/- IW_FORCE_OFFSET_MAX_mN.
 void iw_force_restore(iw_force_t *self, iw_offset_provenance_t provenance, int32_t offset_mN);
 
