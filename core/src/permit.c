@@ -407,7 +407,7 @@ iw_refusal_t iw_permit_reset(iw_permit_t *self, iw_time_us_t now_us) {
 }
 
 iw_refusal_t iw_permit_release(iw_permit_t *self) {
-    if (!is_holding(self->phase) && iw_permit_demand(self) != IW_DEMAND_SILENCE) {
+    if ((!is_holding(self->phase) || is_ramping(self)) && iw_permit_demand(self) != IW_DEMAND_SILENCE) {
         return IW_REFUSE_NOT_AT_REST;
     }
     self->until_release = false;

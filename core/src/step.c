@@ -324,8 +324,8 @@ static void judge_wheels(iw_gateway_t *self) {
     const bool online =
         iw_wheel_online(&self->wheel[IW_LEFT], self->now_us) && iw_wheel_online(&self->wheel[IW_RIGHT], self->now_us);
     const iw_pair_t applied = iw_setpoint_applied(&self->setpoint);
-    // A stalled step neither raises nor clears causes that depend on an age: the next step on time decides (R7). It also
-    // removes no evidence against a wheel that does not follow: steps that are often late would hide the fault.
+    // A stalled step neither raises nor clears causes that depend on an age: the next step on time decides (R7). It
+    // removes no evidence against a wheel that does not follow either: steps that are often late would hide the fault.
     if (self->stalled) {
         iw_permit_retain_present(&self->permit);
     } else {

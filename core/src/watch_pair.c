@@ -29,14 +29,11 @@ static bool has_ended(const iw_gateway_t *self) {
     return demand < IW_DEMAND_BRAKE || (demand == IW_DEMAND_BRAKE && iw_setpoint_is_zero(&self->setpoint));
 }
 
-static bool is_lost(const iw_gateway_t *self) {
-    return iw_wheel_lost(&self->wheel[IW_LEFT], self->now_us) || iw_wheel_lost(&self->wheel[IW_RIGHT], self->now_us);
-}
-
 void iw_watch_pair(iw_gateway_t *self, const iw_pair_t *applied, bool online) {
     iw_diverge_t *const diverge = &self->diverge;
+    const bool lost = (self->permit.raised & (1U << IW_CAUSE_WHEEL_LOST)) != 0U;
     iw_diverge_begin(diverge, self->permit.armed_us);
-    if (has_ended(self) || self->setpoint.from_zero || (!online && is_lost(self))) {
+    if (has_ended(self) || self->setpoint.from_zero || lost) {
         iw_diverge_restart(diverge, self->now_us);
     } else if (online) { // A wheel that is offline only because of a late step removes no evidence against it.
         compare(self, applied);

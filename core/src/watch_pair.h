@@ -12,7 +12,7 @@ int32_t iw_watch_own_mm_s(const struct iw_gateway *self, size_t side);
 
 /// Compares the pair. `applied`: the present pair. `online`: both wheels are online. The deviation restarts from zero
 /// while no setpoint is sent, while zeros are sent, after zero without ramp (the wheels then roll or brake on their
-/// own), and while a wheel is lost. It does not change while a late step alone makes a wheel offline.
+/// own), and while a wheel is reported as lost. It does not change while a late step alone makes a wheel offline.
 void iw_watch_pair(struct iw_gateway *self, const iw_pair_t *applied, bool online);
 
 /// Returns the time at which both wheels are offline if neither sends another speed message.

@@ -133,6 +133,20 @@ TEST(test_permit_keep_release_while_driving_or_arming_is_refused) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_AT_REST, iw_permit_release(&rig.permit));
 }
 
+/// R19: also in a latch. A release that was sent during the ramp would end the zeros of a machine on a slope.
+TEST(test_permit_keep_release_in_the_ramp_of_a_latch_is_refused) {
+    permit_rig_begin(&rig, PERMIT_ARMED);
+    const iw_event_t event = {IW_CAUSE_WHEEL_LOST, IW_SIDES_LEFT, 0, IW_REACT_RAMP};
+    rig.permit.view.output_zero = false;
+    iw_permit_raise(&rig.permit, &event, rig.now_us);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, iw_permit_state(&rig.permit));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_AT_REST, iw_permit_release(&rig.permit));
+    TEST_ASSERT_TRUE(rig.permit.until_release);
+    rig.permit.view.output_zero = true;
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, iw_permit_release(&rig.permit));
+    TEST_ASSERT_FALSE(rig.permit.until_release);
+}
+
 TEST(test_permit_keep_release_without_setpoints_changes_nothing) {
     release();
     assert_silent(IW_STATE_LISTENING);
