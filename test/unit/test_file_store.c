@@ -12,9 +12,11 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/file.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/syscall.h>
+#include <time.h>
 #include <unistd.h>
 
 static size_t length;
@@ -23,9 +25,24 @@ static gw_file_store_t store;
 static const char *reply;
 static int error;
 static char second[128];
-static int fsync_error; ///< Error of fsync in a process that is opened after it is set; 0: none
+static int fsync_error;  ///< Error of fsync in a process that is opened after it is set; 0: none
+static bool fsync_waits; ///< The same: fsync waits until the file "flush" exists
+static bool time_flies;  ///< The same: pauses take no time
+
+static char *in_folder(const char *name) {
+    static char path[128];
+    (void)snprintf(path, sizeof path, "%s/%s", folder, name);
+    return path;
+}
+
+int nanosleep(const struct timespec *pause, struct timespec *left) {
+    return time_flies ? 0 : clock_nanosleep(CLOCK_REALTIME, 0, pause, left);
+}
 
 int fsync(int fd) {
+    while (fsync_waits && access(in_folder("flush"), F_OK) != 0) {
+        (void)poll(NULL, 0, 1);
+    }
     if (fsync_error != 0) {
         errno = fsync_error;
         return -1;
@@ -51,12 +68,6 @@ static void open_store(const char *directory, gw_file_store_news_t expected) {
     TEST_ASSERT_EQUAL_INT(0, gw_file_store_open(&store, directory, "file"));
     TEST_ASSERT_FALSE_MESSAGE(gw_file_store_write(&store, "x", 1), "not before it has answered");
     TEST_ASSERT_EQUAL_INT(expected, next_news());
-}
-
-static char *in_folder(const char *name) {
-    static char path[128];
-    (void)snprintf(path, sizeof path, "%s/%s", folder, name);
-    return path;
 }
 
 /// Adds a second name to an existing file.
@@ -188,6 +199,39 @@ static void test_file_store_never_writes_into_an_existing_file(void) {
     gw_file_store_close(&store);
 }
 
+/// A gateway that starts while the store process of the earlier one still writes must not begin with the older file.
+static void test_file_store_read_waits_for_a_pending_write(void) {
+    put_file("file", "old");
+    fsync_waits = true;
+    open_store(folder, GW_FILE_STORE_READ);
+    fsync_waits = false;
+    TEST_ASSERT_TRUE(gw_file_store_write(&store, "new", 3));
+    for (unsigned ms = 0; ms < 5000U && access(in_folder("file.new"), F_OK) != 0; ms++) {
+        (void)poll(NULL, 0, 1);
+    }
+    gw_file_store_close(&store);
+    TEST_ASSERT_EQUAL_INT(0, gw_file_store_open(&store, folder, "file"));
+    (void)poll(NULL, 0, 50);
+    put_file("flush", ""); // Now the write ends.
+    TEST_ASSERT_EQUAL_INT(GW_FILE_STORE_READ, next_news());
+    TEST_ASSERT_EQUAL_UINT(3, length);
+    TEST_ASSERT_EQUAL_MEMORY("new", reply, 3);
+    gw_file_store_close(&store);
+    (void)unlink(in_folder("flush"));
+}
+
+static void test_file_store_read_does_not_wait_without_end(void) {
+    put_file("file", "old");
+    const int directory = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    TEST_ASSERT_EQUAL_INT(0, flock(directory, LOCK_EX));
+    time_flies = true;
+    open_store(folder, GW_FILE_STORE_READ);
+    time_flies = false;
+    TEST_ASSERT_EQUAL_MEMORY("old", reply, 3);
+    gw_file_store_close(&store);
+    (void)close(directory);
+}
+
 static void assert_not_read(int why) {
     open_store(folder, GW_FILE_STORE_BAD);
     TEST_ASSERT_EQUAL_INT(why, error);
@@ -260,6 +304,8 @@ int main(void) {
     RUN_TEST(test_file_store_failed_write_retains_the_old_file);
     RUN_TEST(test_file_store_reports_failed_fsync_and_rename);
     RUN_TEST(test_file_store_never_writes_into_an_existing_file);
+    RUN_TEST(test_file_store_read_waits_for_a_pending_write);
+    RUN_TEST(test_file_store_read_does_not_wait_without_end);
     RUN_TEST(test_file_store_refuses_file_with_second_name_or_other_owner);
     RUN_TEST(test_file_store_refuses_folder_writable_by_others);
     RUN_TEST(test_file_store_ended_process_is_reported_once);
@@ -267,6 +313,7 @@ int main(void) {
     (void)unlink(in_folder("file.new"));
     (void)unlink(in_folder("file.damaged"));
     (void)unlink(in_folder("other"));
+    (void)unlink(in_folder("flush"));
     (void)rmdir(folder);
     return UNITY_END();
 }

@@ -10,7 +10,12 @@
 #include <sys/file.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
+#include <time.h>
 #include <unistd.h>
+
+/// A reader waits at most this long for writers: 1000 times 10 ms.
+#define LOCK_TRIES    1000U
+#define LOCK_PAUSE_NS 10000000L
 
 /// First byte of a message to the store process. In a message from it, the first byte is the news.
 #define ORDER_WRITE 'w'
@@ -54,6 +59,17 @@ static int read_whole(int fd, char *text, size_t *out_length) {
     return (count < 0) ? errno : 0;
 }
 
+/// Waits until no other store process writes: after a quick restart, the process of the earlier gateway may still flush
+/// the text that this one must read. If the lock is not released in time (a disk that hangs, another program), the file
+/// is read without it: an older text is better than none. A small window remains: the earlier process may have received
+/// its last text and not run since, so that it has not locked yet. The start of a gateway takes much longer than that.
+static void wait_for_writers(int directory) {
+    const struct timespec pause = {.tv_nsec = LOCK_PAUSE_NS};
+    for (unsigned i = 0; i < LOCK_TRIES && flock(directory, LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK; i++) {
+        (void)nanosleep(&pause, NULL);
+    }
+}
+
 static void send_file(work_t *work) {
     size_t length = 0;
     const int directory = sock_folder_open_own(work->directory);
@@ -61,6 +77,7 @@ static void send_file(work_t *work) {
         answer(work, GW_FILE_STORE_FAILED, errno);
         return;
     }
+    wait_for_writers(directory);
     const int fd = openat(directory, work->name, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
     int error = (fd < 0) ? errno : 0;
     (void)close(directory);
@@ -77,7 +94,7 @@ static void send_file(work_t *work) {
 }
 
 /// Writes a new file, flushes it to the disk, and renames it; never writes into an existing file. The directory is
-/// locked meanwhile, because the store process of a gateway that died may still write.
+/// locked meanwhile, because the store process of an earlier gateway may still write, and the next one reads.
 static int write_over(const work_t *work, int directory, size_t length) {
     const char *text = &work->message[1];
     (void)unlinkat(directory, work->fresh, 0);

@@ -5,6 +5,9 @@
 ///     gateway --text--> store process: writes it to a new file, flushes it to the disk, renames it
 ///     gateway <--news-- store process: contents of the file at the start; result of each write
 ///
+/// Store processes lock the directory: the first news contain the last text of an earlier gateway whose store process
+/// still writes. They come at most 10 s late because of it.
+///
 /// The gateway never waits: it passes a text as a whole or not at all, and polls for news in the loop.
 #ifndef GATEWAY_FILE_STORE_H
 #define GATEWAY_FILE_STORE_H
