@@ -349,7 +349,13 @@ class Rig:
         if wheels:
             self.wait_status(
                 client,
-                lambda s: s["left"]["at_rest"] and s["right"]["at_rest"] and s["bus"]["state"] == "active" and s["estop"]["state"] in ("released", "none"),
+                lambda s: (
+                    s["left"]["at_rest"]
+                    and s["right"]["at_rest"]
+                    and s["bus"]["state"] == "active"
+                    and s["estop"]["state"] in ("released", "none")
+                    and s["memory"]["state"] != "loading"  # Before that the gateway refuses arm.
+                ),
             )
         client.close()
         return answered_ms

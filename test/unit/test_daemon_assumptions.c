@@ -129,6 +129,54 @@ TEST(test_stored_contradiction_denies_arm) {
     TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"arm\"}"), "\"error\":\"denied\""));
 }
 
+/// A contradiction is read at arm, so the file must come first.
+TEST(test_arm_before_the_store_has_answered_is_denied) {
+    gw_assumptions_t *assumptions = &daemon_rig.daemon->assumptions;
+    assumptions->answered = false;
+    assumptions->start_us = daemon_rig.now_us;
+    daemon_rig_run(GW_ASSUMPTIONS_PATIENCE_US / IW_US_PER_MS / 2U);
+    TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"arm\"}"), "\"error\":\"denied\""));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(daemon_rig.reply, "try again in a second"), daemon_rig.reply);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, daemon_rig_state());
+    store(IW_ASSUMPTION_MOUNT_SIGN_LEFT, IW_CONTRADICTED, IW_SOURCE_OPERATOR);
+    print_stored();
+    TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"arm\"}"), "mount_sign_left is contradicted"));
+}
+
+TEST(test_arm_after_the_patience_needs_no_store) {
+    gw_assumptions_t *assumptions = &daemon_rig.daemon->assumptions;
+    assumptions->answered = false;
+    assumptions->start_us = daemon_rig.now_us;
+    daemon_rig_run(GW_ASSUMPTIONS_PATIENCE_US / IW_US_PER_MS + 100U);
+    daemon_rig_arm(client);
+}
+
+TEST(test_stored_contradiction_that_comes_late_is_reported) {
+    gw_assumptions_t *assumptions = &daemon_rig.daemon->assumptions;
+    daemon_rig_keep_log();
+    assumptions->store.waits = true;
+    store(IW_ASSUMPTION_MOUNT_SIGN_LEFT, IW_CONTRADICTED, IW_SOURCE_OPERATOR);
+    length = gw_assumptions_file_write(&stored, daemon_rig.daemon->config.bus.interface, text, sizeof text);
+    news = GW_FILE_STORE_READ;
+    daemon_rig_run(50);
+    assumptions->store.waits = false;
+    TEST_ASSERT_EQUAL_UINT(1, daemon_rig_logged("assumption mount_sign_left = no is contradicted by the operator"));
+    TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"arm\"}"), "mount_sign_left is contradicted"));
+}
+
+/// No cause of a stop names a contradiction: docs/developer/ledger.md promises the next arm.
+TEST(test_contradiction_during_a_drive_takes_effect_at_the_next_arm) {
+    daemon_rig_begin_driving(client);
+    TEST_ASSERT_NOT_NULL(
+        strstr(daemon_rig_ask(client, "{\"cmd\":\"confirm\",\"item\":\"mount_sign_left\",\"value\":\"yes\"}"),
+               "\"state\":\"contradicted\""));
+    daemon_rig_drive(client, 500, 500, 300);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
+    (void)daemon_rig_ask(client, "{\"cmd\":\"stop\"}");
+    daemon_rig_run(3000);
+    TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"arm\"}"), "mount_sign_left is contradicted"));
+}
+
 TEST(test_stored_confirmation_does_not_lift_a_contradiction) {
     store(IW_ASSUMPTION_GEAR_RATIO, IW_CONFIRMED, IW_SOURCE_OPERATOR);
     iw_assumption_contradict(&daemon_rig.daemon->wheels.core.assumptions, IW_ASSUMPTION_GEAR_RATIO, IW_SOURCE_BUS,

@@ -63,12 +63,18 @@ void iwn_target_event(iwn_server_t *server, iwn_client_t *client, char *line, si
 }
 
 /// A request that permits motion and waited behind an earlier one of its client must not undo a stop that arrived in
-/// the meantime. Each arm has a new key.
+/// the meantime. No arm precedes the stored assumptions, because a contradiction is read at arm only. Each arm has a new
+/// key.
 bool iwn_target_permits(iwn_server_t *server, iwn_client_t *client) {
     gw_answers_t *self = gw_answers_of(server);
     const bool arms = server->request.cmd == IWN_CMD_ARM;
     if (arms && self->wheels->shutting_down) {
         return IWN_REFUSE(&server->refusal, IWN_DENIED, "the gateway is shutting down; wait until it is started again");
+    }
+    if (arms && !self->assumptions->answered) {
+        return IWN_REFUSE(&server->refusal, IWN_DENIED,
+                          "the gateway still reads the stored assumptions about the wheels, and one of them may forbid "
+                          "motion; try again in a second");
     }
     if (sock_client_waited_through_stop(gw_answers_connection(self, client))) {
         return IWN_REFUSE(
@@ -168,8 +174,9 @@ void iwn_target_tared(iwn_server_t *server, const iwn_client_t *client, iw_side_
     gw_wheels_note(self->wheels, client->id, &entry);
 }
 
-/// Confirms or contradicts an assumption by the operator. It moves nothing, and a contradiction takes effect
-/// immediately.
+/// Confirms or contradicts an assumption by the operator. It moves nothing. What a contradiction disables is disabled
+/// immediately, except motion: a contradiction that denies arm takes effect at the next arm. It does not end a drive,
+/// because no cause of a stop names it.
 static void do_confirm(gw_answers_t *self, iwn_client_t *client) {
     const iwn_request_t *request = &self->server.request;
     inspect_word_t word;

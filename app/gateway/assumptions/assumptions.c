@@ -209,14 +209,15 @@ static void receive_store(gw_assumptions_t *self) {
     size_t length = 0;
     int error = 0;
     const gw_file_store_news_t news = gw_file_store_receive(&self->store, &text, &length, &error);
-    if (news == GW_FILE_STORE_READ || news == GW_FILE_STORE_ABSENT || news == GW_FILE_STORE_BAD) {
+    const bool loaded = news == GW_FILE_STORE_READ || news == GW_FILE_STORE_ABSENT || news == GW_FILE_STORE_BAD;
+    if (loaded) {
         self->error = error;
         take_file(self, news, text, length);
     } else if (news != GW_FILE_STORE_NO_NEWS) {
         receive_result(self, news, (news == GW_FILE_STORE_GONE) ? ECHILD : error);
     }
     const bool waited = self->wheels->now_us - self->start_us > GW_ASSUMPTIONS_PATIENCE_US;
-    if (!self->answered && (self->state != GW_ASSUMPTIONS_LOADING || waited)) {
+    if (loaded || (!self->answered && (self->state != GW_ASSUMPTIONS_LOADING || waited))) { // A late file is reported.
         self->answered = true;
         gw_assumptions_report_changes(self);
     }

@@ -5,7 +5,8 @@
 ///     start: store process reads --> merged into the core; entries for other values are dropped and reported
 ///     run:   change of an assumption or a force offset --> record, log line, event --> store process writes
 ///
-/// No function waits. Changes are not reported before the store process has answered, at most for 1 s.
+/// No function waits. Changes are not reported and arm is refused before the store process has answered, at most for
+/// 1 s. A contradiction in a file that comes later denies the next arm; it does not end a drive.
 #ifndef GATEWAY_ASSUMPTIONS_H
 #define GATEWAY_ASSUMPTIONS_H
 
@@ -21,7 +22,7 @@ struct iwn_server;
 struct sock_log;
 struct gw_wheels;
 
-/// Longest wait for the store process before changes are reported.
+/// Longest wait for the store process before changes are reported and arm is permitted.
 #define GW_ASSUMPTIONS_PATIENCE_US 1000000U
 /// Shortest interval between writes ...
 #define GW_ASSUMPTIONS_WRITE_US 1000000U
