@@ -6,7 +6,7 @@
 
 #include <string.h>
 
-#define NOT_HERE "this gateway is a microcontroller and has no "
+#define NOT_HERE "a microcontroller has no "
 
 iwn_client_t *iwn_target_next(iwn_server_t *server, const iwn_client_t *after) {
     brd_host_t *const self = brd_host_of(server);
@@ -43,13 +43,16 @@ void iwn_target_state(iwn_server_t *server, const iw_snapshot_t *seen, bool due_
 }
 
 bool iwn_target_permits(iwn_server_t *server, iwn_client_t *client) {
-    const brd_host_t *const self = brd_host_of(server);
+    brd_host_t *const self = brd_host_of(server);
     if (server->request.cmd != IWN_CMD_ARM) {
         return true;
     }
     if (self->restart_us != 0U) {
         return IWN_REFUSE(&server->refusal, IWN_DENIED,
                           "a configuration was committed: the gateway restarts with it, then arm");
+    }
+    if (!brd_host_is_configured(self)) {
+        return false;
     }
     return brd_pending_has_room(&self->pending, client->id, IWN_CMD_ARM) ||
            IWN_REFUSE(&server->refusal, IWN_BUSY, "other answers still wait for the serial line; try again");

@@ -82,10 +82,12 @@ void brd_records_open(brd_records_t *self, bool power_on, bool is_urgent, brd_fa
 
 bool brd_records_settings(const brd_records_t *self, brd_settings_t *out_settings) {
     record_t record;
-    iwn_text_t nowhere = iwn_text_begin((char[1]){0}, 1);
     read(self, &record);
+    if ((record.is.flags & HAS_SETTINGS) == 0U) {
+        return false;
+    }
     *out_settings = record.is.settings;
-    return (record.is.flags & HAS_SETTINGS) != 0U && brd_settings_check(out_settings, &nowhere);
+    return true;
 }
 
 bool brd_records_assumptions(const brd_records_t *self, brd_assumptions_t *out_learned) {

@@ -19,7 +19,8 @@ typedef struct {
 /// long as an erase, unless `is_urgent` is set, because the wheels may be turning.
 void brd_records_open(brd_records_t *self, bool power_on, bool is_urgent, brd_fault_t fault);
 
-/// Reads the committed configuration. Returns false if there is none, or if it is not valid.
+/// Reads the committed configuration. Returns false, and leaves `*out_settings` unchanged, if there is none. The values
+/// may be invalid, because another version has checked them: see brd_settings_apply.
 bool brd_records_settings(const brd_records_t *self, brd_settings_t *out_settings);
 /// Reads the learned facts. Returns false if there are none.
 bool brd_records_assumptions(const brd_records_t *self, brd_assumptions_t *out_learned);

@@ -245,11 +245,20 @@ bool brd_settings_set_key(brd_settings_t *self, brd_key_t key, const char *value
     return set(self, &rows[key], value, why);
 }
 
+/// Returns the row of a number that is outside its range. Role and switches are never stored with another value.
+static const row_t *row_of(iw_config_fault_t fault) {
+    const row_t *row = rows;
+    while (row < &rows[ROWS - 1U] && (row->kind > GEAR || row->at + 1U != (unsigned)fault)) {
+        row++;
+    }
+    return row;
+}
+
 bool brd_settings_check(const brd_settings_t *self, iwn_text_t *why) {
     iw_config_t config;
-    iw_config_default(&config);
     brd_settings_to(self, &config);
-    switch (iw_config_check(&config)) {
+    const iw_config_fault_t fault = iw_config_check(&config);
+    switch (fault) {
     case IW_CONFIG_OK:
         return true;
     case IW_CONFIG_STOP_BUDGET:
@@ -265,12 +274,22 @@ bool brd_settings_check(const brd_settings_t *self, iwn_text_t *why) {
     case IW_CONFIG_MIN_CURRENT:
         iwn_text_add(why, "min_current_mA must not be more than max_current_mA");
         return false;
+    case IW_CONFIG_GEAR_PER:
     case IW_CONFIG_GEAR_RATIO:
         iwn_text_add(why, "gear_ratio must lie within 1 and 100");
         return false;
     default:
-        iwn_text_add(why, "a value is outside its range; set it again");
-        return false;
+        return refuse_number(row_of(fault), why);
+    }
+}
+
+void brd_settings_apply(const brd_settings_t *self, iw_config_t *config) {
+    iwn_text_t nowhere = iwn_text_begin((char[1]){0}, 1);
+    if (brd_settings_check(self, &nowhere)) {
+        brd_settings_to(self, config);
+    } else {
+        config->setpoint_type_set = false;
+        config->current_role = IW_ROLE_UNSET;
     }
 }
 

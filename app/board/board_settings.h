@@ -55,6 +55,11 @@ bool brd_settings_value(const brd_settings_t *self, brd_key_t key, char out_text
 /// Checks the relations between keys. Returns false, and writes reason and fix to `why`, if one does not hold.
 bool brd_settings_check(const brd_settings_t *self, iwn_text_t *why);
 
+/// Writes the values to `config` if brd_settings_check accepts them. Otherwise `config` keeps its values, but is without
+/// setpoint type and role of the current, so that the gateway refuses to arm: valid values next to the invalid one
+/// (invert, max_speed_mm_s) are not in force.
+void brd_settings_apply(const brd_settings_t *self, iw_config_t *config);
+
 /// Writes the list `keys` of the reply to `config`, with values in the form of the configuration file; null: not set.
 void brd_settings_write(const brd_settings_t *self, iwn_out_t *json);
 

@@ -21,6 +21,7 @@ static_assert(BRD_APB1_HZ >= 16U * BRD_SERIAL_BAUD,
 
 static brd_host_t host;
 static brd_records_t records;
+static brd_settings_t settings; // Stored, or those of the image.
 static bool is_begun;
 static bool is_complete; // The configuration is complete enough to send.
 
@@ -40,15 +41,14 @@ void brd_commander_open(bool power_on, bool in_motion) {
 }
 
 void brd_commander_configure(iw_config_t *config) {
-    brd_settings_t settings;
-    if (brd_records_settings(&records, &settings)) {
-        brd_settings_to(&settings, config);
-    }
+    settings = brd_settings_from(config);
+    (void)brd_records_settings(&records, &settings);
+    brd_settings_apply(&settings, config);
     is_complete = config->setpoint_type_set && config->current_role != IW_ROLE_UNSET;
 }
 
-bool brd_host_store(const brd_settings_t *settings) {
-    return brd_records_commit(&records, settings);
+bool brd_host_store(const brd_settings_t *staged) {
+    return brd_records_commit(&records, staged);
 }
 
 bool brd_host_read_assumptions(brd_assumptions_t *out_learned) {
@@ -70,7 +70,7 @@ static void begin(iw_gateway_t *gateway, iw_time_us_t now_us) {
         .estop = estop,
         .bitrate_hz = BRD_APB1_HZ / BRD_BIT_PRESCALER / BRD_BIT_QUANTA,
         .sample_point_permille = (1U + BRD_BIT_BS1) * 1000U / BRD_BIT_QUANTA,
-        .settings = brd_settings_from(brd_report_room()->config),
+        .settings = settings,
         .rate_max_hz = RATE_MAX_HZ,
         .boot = brd_boot_id(records.power_ons),
         .last_fault = records.fault,

@@ -145,6 +145,14 @@ bool brd_host_is_silent(const brd_host_t *self) {
            !iw_gateway_arming(self->server.core);
 }
 
+bool brd_host_is_configured(brd_host_t *self) {
+    iwn_refusal_t *const refusal = &self->server.refusal;
+    iwn_text_t why = iwn_text_begin(refusal->message, sizeof refusal->message);
+    refusal->error = IWN_DENIED;
+    iwn_text_add(&why, "stored settings not in force: ");
+    return brd_settings_check(&self->settings, &why);
+}
+
 /// While nothing is sent, checks periodically whether there are facts that the flash does not contain.
 static void learn(brd_host_t *self, const iw_snapshot_t *seen) {
     brd_assumptions_t now;
@@ -160,7 +168,8 @@ static void learn(brd_host_t *self, const iw_snapshot_t *seen) {
     memset(&stored, 0, sizeof stored);
     (void)brd_host_read_assumptions(&stored);
     brd_assumptions_note(&now, seen, &self->settings, self->zero);
-    if (brd_assumptions_differs(&now, &stored)) {
+    // While the stored values are not in force, the observations are not about them.
+    if (brd_assumptions_differs(&now, &stored) && brd_host_is_configured(self)) {
         self->records = brd_host_write_assumptions(&now) ? BRD_RECORDS_STORED : BRD_RECORDS_FAILED;
     }
 }
@@ -184,15 +193,13 @@ void brd_host_init(brd_host_t *self, const brd_host_place_t *place, iw_time_us_t
     self->last_fault = place->last_fault;
     self->received_us = now_us;
     self->linked_us = now_us;
-    iw_config_t config;
-    brd_settings_to(&place->settings, &config);
-    self->lease_us = config.lease_ms * IW_US_PER_MS;
     self->settings = place->settings;
     self->staged = place->settings;
     iwn_receiver_init(&self->receiver, self->in, sizeof self->in, false);
     iwn_server_begin(server);
     restore_assumptions(self);
     brd_host_report_link(self);
+    self->lease_us = iwn_server_snapshot(server)->config->lease_ms * IW_US_PER_MS;
 }
 
 bool brd_host_wants_restart(brd_host_t *self) {

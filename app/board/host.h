@@ -77,7 +77,7 @@ typedef struct {
     const char *estop;   ///< Name of the e-stop's pin.
     uint32_t bitrate_hz; ///< Bit rate of the bus.
     uint32_t sample_point_permille;
-    brd_settings_t settings; ///< Settings in force.
+    brd_settings_t settings; ///< Settings of this start; in force if brd_settings_check accepts them.
     uint32_t rate_max_hz;    ///< Highest rate of snapshots that the serial line carries in addition to replies.
     uint64_t boot;           ///< Identifier of this start; every start has another one.
     brd_fault_t last_fault;  ///< Fault that ended an earlier run; cause 0: none.
@@ -108,7 +108,7 @@ typedef struct {
     brd_assumptions_zero_t zero[IW_SIDES]; ///< Sources of the offsets in force.
     brd_host_reported_t reported;
     iwn_server_t server;
-    brd_settings_t settings; ///< Settings in force.
+    brd_settings_t settings; ///< As in brd_host_place_t.
     brd_settings_t staged;   ///< Changed by `config`; in force after a commit and the restart that follows it.
     brd_host_client_t client[IWN_LINE_CHANNELS]; ///< Index 0 is channel 1.
     iwn_receiver_t receiver;
@@ -165,6 +165,10 @@ bool brd_host_write_assumptions(const brd_assumptions_t *learned);
 /// Returns true if the gateway is listening and sends nothing, not even zeros of a hold. Then no wheel waits while the
 /// CPU writes to flash.
 bool brd_host_is_silent(const brd_host_t *self);
+
+/// Returns true if the stored settings are in force. Otherwise writes to the server's refusal what is wrong with them:
+/// the board does not arm until `config` corrects that.
+bool brd_host_is_configured(brd_host_t *self);
 
 /// Returns true when the board must restart. Call it after each step.
 bool brd_host_wants_restart(brd_host_t *self);

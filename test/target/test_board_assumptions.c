@@ -303,6 +303,52 @@ TEST(test_learned_record_of_version_0_2_is_read_with_defaults) {
     }
 }
 
+/// Version 0.2 accepted these values. The wheels of this machine turn against each other without `invert`.
+TEST(test_records_of_0_2_outside_new_limits_do_not_arm) {
+    static const struct {
+        uint16_t radius_mm, max_current_mA, follow_mm_s;
+        const char *why, *key, *value;
+    } cases[] = {{300, 1000, 300, "set it to 1 first", "limits.rest_rpm", "1"},
+                 {200, 200, 300, "drive.max_current_mA must be 300 to 2000", "drive.max_current_mA", "300"},
+                 {200, 1000, 900, "limits.follow_mm_s must be 50 to 500", "limits.follow_mm_s", "500"}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        setUp();
+        rig.config.setpoint_type_set = true;
+        rig.config.current_role = IW_ROLE_LIMIT;
+        rig.config.invert[IW_RIGHT] = true;
+        rig.config.rest_rpm = 2;
+        rig.config.radius_mm = cases[i].radius_mm;
+        rig.config.max_current_mA = cases[i].max_current_mA;
+        rig.config.follow_mm_s = cases[i].follow_mm_s;
+        const brd_settings_t before = brd_settings_from(&rig.config);
+        brd_records_t stored = power_on();
+        write_as_before(&stored, &before, NULL);
+        stored = power_on();
+        iw_config_t config;
+        iw_config_default(&config);
+        config.setpoint_type_set = true;
+        config.current_role = IW_ROLE_LIMIT;
+        brd_settings_t found = brd_settings_from(&config);
+        TEST_ASSERT_TRUE(brd_records_settings(&stored, &found));
+        brd_settings_apply(&found, &config);
+        TEST_ASSERT_FALSE(config.setpoint_type_set);
+        TEST_ASSERT_EQUAL_INT(IW_ROLE_UNSET, config.current_role);
+        TEST_ASSERT_EQUAL_INT(IW_CONFIG_OK, iw_config_check(&config));
+        char text[256];
+        iwn_text_t why = iwn_text_begin(text, sizeof text);
+        TEST_ASSERT_FALSE(brd_settings_check(&found, &why));
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, cases[i].why), text);
+        // The operator corrects this key and commits.
+        TEST_ASSERT_TRUE_MESSAGE(brd_settings_set(&found, cases[i].key, cases[i].value, &why), text);
+        TEST_ASSERT_TRUE(brd_records_commit(&stored, &found));
+        stored = power_on();
+        TEST_ASSERT_TRUE(brd_records_settings(&stored, &found));
+        brd_settings_apply(&found, &config);
+        TEST_ASSERT_TRUE(config.setpoint_type_set && config.invert[IW_RIGHT]);
+        TEST_ASSERT_EQUAL_INT(IW_ROLE_LIMIT, config.current_role);
+    }
+}
+
 TEST(test_learned_record_of_version_0_2_without_settings_is_empty) {
     brd_settings_t found;
     brd_assumptions_t read;

@@ -40,13 +40,12 @@ TEST(test_channel_of_a_relay_that_sends_alive_stays_open) {
     TEST_ASSERT_NOT_EQUAL_UINT(IW_CLIENT_NONE, host.client[0].served.id);
 }
 
-/// Starts the gateway with another lease and connects its relay.
+/// Starts the host with another lease than the gateway and connects its relay.
 static void start_with_lease(uint16_t lease_ms) {
-    iw_config_t config = rig.config;
-    config.lease_ms = lease_ms;
-    place.settings = brd_settings_from(&config);
     memset(&host, 0, sizeof host);
     brd_host_init(&host, &place, rig.now_us);
+    TEST_ASSERT_EQUAL_UINT32(rig.config.lease_ms * 1000U, host.lease_us);
+    host.lease_us = lease_ms * 1000U;
     say(0, "{\"cmd\":\"link\"}");
     say(0, "{\"cmd\":\"open\",\"channel\":1,\"watch\":false}");
     run_ms(20);

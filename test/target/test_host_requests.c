@@ -169,6 +169,37 @@ TEST(test_host_without_a_track_refuses_arm_and_has_null) {
     assert_answer("{\"cmd\":\"confirm\",\"id\":3,\"item\":\"track\",\"value\":\"540\"}", "\"error\":\"track_not_set\"");
 }
 
+TEST(test_host_with_refused_stored_settings_names_the_fix) {
+    disarm();
+    rig.gateway.config.rest_rpm = 3;
+    rig.gateway.config.invert[IW_RIGHT] = true;
+    place.settings = brd_settings_from(&rig.gateway.config);
+    brd_host_init(&host, &place, rig.now_us);
+    assert_answer("{\"cmd\":\"arm\",\"id\":1}", "\"error\":\"denied\",\"message\":\"stored settings not in force: ");
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(answer, "rest_rpm"), answer);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(answer, "set it to 2 first"), answer);
+    assert_answer("{\"cmd\":\"reset\",\"id\":2}", "\"id\":2");
+    TEST_ASSERT_NULL_MESSAGE(strstr(answer, "not in force"), answer);
+    assert_answer("{\"cmd\":\"config\",\"key\":\"limits.rest_rpm\",\"value\":2,\"id\":3}",
+                  "{\"key\":\"right.invert\",\"value\":\"yes\"}");
+    assert_answer("{\"cmd\":\"config\",\"commit\":true,\"id\":4}", "\"restarts\":true");
+}
+
+/// With defaults in force an observation of the bus does not apply to the stored values.
+TEST(test_host_with_refused_stored_settings_learns_nothing) {
+    disarm();
+    rig.gateway.config.rest_rpm = 3;
+    place.settings = brd_settings_from(&rig.gateway.config);
+    brd_host_init(&host, &place, rig.now_us);
+    flash_writes = 0;
+    say(1, "{\"cmd\":\"confirm\",\"item\":\"dlc\",\"value\":\"yes\"}");
+    for (unsigned i = 0; i < 50U; i++) {
+        say(0, "{\"cmd\":\"alive\"}");
+        run_ms(100);
+    }
+    TEST_ASSERT_EQUAL_UINT32(0, flash_writes);
+}
+
 TEST(test_host_refused_setting_names_its_range) {
     assert_answer("{\"cmd\":\"config\",\"id\":1,\"key\":\"wheels.track_mm\",\"value\":\"0\"}",
                   "\"error\":\"bad_value\"");
