@@ -207,7 +207,8 @@ bool brd_host_wants_restart(brd_host_t *self) {
     if (!brd_serial_is_idle()) {
         self->unsent_us = now_us;
     }
-    return self->restart_us != 0U && (now_us - self->unsent_us >= BRD_HOST_LAST_BYTES_US || now_us >= self->restart_us);
+    return self->restart_us != 0U && brd_host_is_silent(self) &&
+           (now_us - self->unsent_us >= BRD_HOST_LAST_BYTES_US || now_us >= self->restart_us);
 }
 
 bool brd_host_receive(brd_host_t *self, iw_time_us_t now_us) {

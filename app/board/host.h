@@ -170,7 +170,8 @@ bool brd_host_is_silent(const brd_host_t *self);
 /// the board does not arm until `config` corrects that.
 bool brd_host_is_configured(brd_host_t *self);
 
-/// Returns true when the board must restart. Call it after each step.
+/// Returns true when the board must restart. Call it after each step. The restart would clear the latch of a stop that
+/// came after the commit, so it waits until a person has reset it. Arm is refused meanwhile.
 bool brd_host_wants_restart(brd_host_t *self);
 
 void brd_host_config(brd_host_t *self, iwn_client_t *client);

@@ -317,12 +317,14 @@ TEST(test_host_status_has_the_estop_and_the_zero_of_each_wheel) {
 }
 
 TEST(test_host_restarts_only_on_request) {
+    disarm();
     TEST_ASSERT_FALSE(brd_host_wants_restart(&host));
     host.restart_us = 1;
     TEST_ASSERT_TRUE(brd_host_wants_restart(&host));
 }
 
 TEST(test_host_restarts_1_ms_after_the_last_bytes) {
+    disarm();
     const iw_time_us_t begin_us = host.server.now_us;
     host.restart_us = begin_us + 400000U;
     serial_sends = true;
@@ -334,7 +336,24 @@ TEST(test_host_restarts_1_ms_after_the_last_bytes) {
     TEST_ASSERT_TRUE(brd_host_wants_restart(&host));
 }
 
+/// A restart would clear the latch that the reply to the estop has reported.
+TEST(test_host_estop_before_a_restart_stays_latched) {
+    disarm();
+    host.restart_us = 1;
+    TEST_ASSERT_TRUE(brd_host_wants_restart(&host));
+    say(1, "{\"cmd\":\"estop\",\"id\":1}");
+    run_ms(20);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, iw_gateway_state(&rig.gateway));
+    TEST_ASSERT_FALSE(brd_host_wants_restart(&host));
+    pass(3000);
+    TEST_ASSERT_FALSE(brd_host_wants_restart(&host));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, iw_gateway_reset(&rig.gateway, rig.now_us));
+    pass(100);
+    TEST_ASSERT_TRUE(brd_host_wants_restart(&host));
+}
+
 TEST(test_host_restarts_late_while_bytes_do_not_leave) {
+    disarm();
     serial_sends = true;
     host.restart_us = host.server.now_us + 400000U;
     host.server.now_us = host.restart_us - 1U;
