@@ -44,11 +44,13 @@ static bool is_blank(unsigned page, unsigned slot) {
     return true;
 }
 
+/// A page is filled from its first slot, so its last full slot has the newest record. The CRC of that one is computed,
+/// and that of an older one only if it is wrong: after a restart in motion the wheels wait for the first zeros.
 void brd_store_open(brd_store_t *self) {
     *self = (brd_store_t){.sequence = 0};
     for (unsigned page = 0; page < BRD_FLASH_PAGES; page++) {
-        for (unsigned slot = 0; slot < SLOTS; slot++) {
-            if (is_right(page, slot) && read(page, slot, 0) > self->sequence) {
+        for (unsigned slot = SLOTS; slot-- > 0U;) {
+            if (read(page, slot, 0) > self->sequence && is_right(page, slot)) {
                 self->sequence = read(page, slot, 0);
                 self->page = (uint8_t)page;
                 self->slot = (uint8_t)slot;

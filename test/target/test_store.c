@@ -11,10 +11,12 @@ static uint32_t flash[BRD_FLASH_PAGES][BRD_FLASH_PAGE_WORDS];
 static unsigned operations; ///< Operations since the start.
 static unsigned cut_after;  ///< Number of complete operations; the next one is executed partly.
 static unsigned erasures;
+static unsigned reads;
 static bool is_dead;     ///< No operation is executed any more.
 static uint32_t torn_by; ///< Bits of the cut operation that were written.
 
 uint32_t brd_flash_read(unsigned page, unsigned word) {
+    reads++;
     return flash[page][word];
 }
 
@@ -135,6 +137,18 @@ TEST(test_store_cut_at_any_instant_leaves_the_old_or_new_record) {
         }
         TEST_ASSERT_TRUE_MESSAGE(write(&store, number + 1U, true), "cuts left no way to go on");
     }
+}
+
+/// After a restart in motion the wheels wait for the first zeros while the record is searched.
+TEST(test_store_open_computes_one_crc_per_page) {
+    brd_store_t store;
+    (void)newest(&store);
+    for (uint32_t number = 1; brd_store_blank(&store) > 0U || erasures == 0U; number++) {
+        TEST_ASSERT_TRUE(write(&store, number, erasures == 0U));
+    }
+    reads = 0;
+    brd_store_open(&store);
+    TEST_ASSERT_LESS_OR_EQUAL_UINT(BRD_FLASH_PAGES * (64U + 2U + 2U * BRD_FLASH_PAGE_WORDS / 64U), reads);
 }
 
 TEST(test_store_flipped_bit_falls_back_to_the_previous_record) {
