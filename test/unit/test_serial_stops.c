@@ -93,6 +93,36 @@ TEST(test_relay_stop_directly_before_closing_is_sent) {
     assert_stop_before_close("\"stop\"");
 }
 
+/// Noise or another program has left a part of a line in the board's receiver, or the board has lost bytes of it.
+TEST(test_relay_stop_after_an_incomplete_line_is_received) {
+    last_line = ESTOP;
+    run(stop_and_close);
+    const char *at = strstr(to_board, "\"estop\"");
+    TEST_ASSERT_NOT_NULL_MESSAGE(at, to_board);
+    const char *const stop = at;
+    while (at > to_board && strncmp(at, "}*", 2) != 0) { // To the end of the line before it.
+        at--;
+    }
+    at = strchr(at, '\n');
+    TEST_ASSERT_NOT_NULL_MESSAGE(at, to_board);
+    for (unsigned lost = 0; lost < 2U; lost++) {
+        char data[IWN_LINE_BOARD_MAX];
+        iwn_receiver_t board;
+        iwn_line_t line;
+        iwn_receiver_init(&board, data, sizeof data, false);
+        TEST_ASSERT_EQUAL_INT(IWN_LINE_NOTHING, iwn_receiver_put(&board, '1', &line));
+        if (lost > 0U) {
+            iwn_receiver_spoil(&board);
+        }
+        iwn_line_verdict_t verdict = IWN_LINE_NOTHING;
+        const char *next = at + 1;
+        do {
+            verdict = iwn_receiver_put(&board, *next, &line);
+        } while (*next++ != '\n' || next <= stop);
+        TEST_ASSERT_EQUAL_INT_MESSAGE(IWN_LINE_GOOD, verdict, at);
+    }
+}
+
 TEST(test_relay_stop_before_closing_is_sent_after_a_refused_arm) {
     last_line = ESTOP;
     refused_before = true;

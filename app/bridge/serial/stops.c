@@ -22,7 +22,7 @@ size_t relay_write_numbered(iwn_json_t root, uint64_t number, char *out, size_t 
     return (text.length + 1U < size) ? text.length : 0U;
 }
 
-IW_STATIC_ASSERT(2U * IWN_REASON_MAX + 64U <= SERIAL_JSON_MAX, a_stop_with_the_longest_reason_fits_the_line);
+IW_STATIC_ASSERT(1U + 2U * IWN_REASON_MAX + 64U <= SERIAL_JSON_MAX, a_stop_with_the_longest_reason_fits_the_line);
 
 /// Writes the request without its other fields: they may not fit, and an older board refuses unknown ones.
 static void write_stop(relay_stop_t *stop, const iwn_request_t *asked) {
@@ -273,6 +273,8 @@ static uint8_t served_channel(const relay_t *self, const relay_stop_t *stop) {
     return found;
 }
 
+/// The newline before the line ends an incomplete one that the board has received. Otherwise the stop would be a part of
+/// that line, and only its repetition would be executed.
 size_t relay_next_stop(relay_t *self, char *out, size_t size) {
     relay_stop_t *stop = due_stop(self);
     const uint8_t channel = (stop != NULL) ? served_channel(self, stop) : 0U;
@@ -281,5 +283,7 @@ size_t relay_next_stop(relay_t *self, char *out, size_t size) {
     }
     serial_queue_sent(&stop->request, self->now_us);
     const iwn_line_t line = {.channel = channel, .json = stop->request.json, .length = stop->request.length};
-    return iwn_line_write(&line, out, size);
+    out[0] = '\n';
+    const size_t length = iwn_line_write(&line, &out[1], size - 1U);
+    return (length > 0U) ? 1U + length : 0U;
 }
