@@ -4,6 +4,7 @@
 import itertools
 import json
 import random
+import zlib
 from pathlib import Path
 
 import beginnings
@@ -468,6 +469,40 @@ def hardware_watchdog(rig):
     host.arm()
 
 
+def change_stored(flash, old, new):
+    """Replaces the first value `old` in the newest record, with its CRC, as if another version had stored it."""
+    slots = (flash.memory[at : at + 256] for at in range(0, len(flash.memory), 256))
+    records = [(int.from_bytes(slot[:4], "little"), at) for at, slot in enumerate(slots)]
+    at = 256 * max(record for record in records if record[0] != 0xFFFFFFFF)[1]
+    slot = bytes(flash.memory[at : at + 252]).replace(old.to_bytes(2, "little"), new.to_bytes(2, "little"), 1)
+    flash.memory[at : at + 256] = slot + zlib.crc32(slot).to_bytes(4, "little")
+
+
+def refused_record(rig):
+    """A stored value that this version does not accept: the board sends nothing, names the value, and retains the other keys."""
+    host = start(rig)
+    for key, value in (("wheels.radius_mm", 259), ("right.invert", "yes")):
+        host.ask(1, {"cmd": "config", "key": key, "value": value})
+    assert host.ask(1, {"cmd": "config", "commit": True})["restarts"]
+    host.begin_again()
+    change_stored(rig.machine.flash, 259, 401)
+    rig.machine.lose_power()
+    host.begin_again()
+    sent = len(rig.setpoints())
+    refused = host.ask(1, {"cmd": "arm"})
+    assert refused["message"] == "stored settings not in force: wheels.radius_mm must be 60 to 400", refused
+    rig.run(3 * SECOND)
+    assert len(rig.setpoints()) == sent, "it sends"
+    staged = keys_of(host.ask(1, {"cmd": "config", "key": "wheels.radius_mm", "value": 260}))
+    assert staged["right.invert"] == "yes", staged
+    assert host.ask(1, {"cmd": "config", "commit": True})["restarts"]
+    host.begin_again()
+    now = keys_of(host.ask(1, {"cmd": "config"}))
+    assert now == staged and now["wheels.radius_mm"] == "260", now
+    host.arm()
+    rig.expect_resets("software", "power", "software")
+
+
 def stored_in_flash(rig):
     """The board stores observations of the wheels only after two seconds without setpoints, restores them with their provenance after
     power-off, and drops them with the setting for which they were found."""
@@ -774,6 +809,7 @@ SCENARIOS = (
     software_estop,
     reset_in_motion,
     config_in_flash,
+    refused_record,
     power_cut_while_writing,
     stored_in_flash,
     power_cut_while_learning,
