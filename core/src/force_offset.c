@@ -25,7 +25,7 @@ static bool saturated(int16_t raw) {
     return raw == INT16_MIN || raw == INT16_MAX;
 }
 
-static bool stale(const iw_force_t *self, iw_time_us_t now_us) {
+static IW_APART bool stale(const iw_force_t *self, iw_time_us_t now_us) {
     return iw_age_us(self->raw_us, now_us) >= IW_FORCE_STALE_US;
 }
 
@@ -146,7 +146,7 @@ static iw_unit_observation_t weigh(int32_t mean_raw, int32_t offset_dN) {
 
 /// Compares the mean of a good window with the wheel's offset. A small offset cannot decide the unit (0 in cN is 0 in
 /// dN), but a mean far from it still shows a load in one of the two measurements.
-static void judge_unit(iw_force_t *self) {
+static IW_APART void judge_unit(iw_force_t *self) {
     const int32_t offset_dN = self->wheel_offset_dN;
     const int32_t mean_raw = self->quality.mean_mN / scale_mN(self);
     if (!self->wheel_offset_received || self->quality.window != IW_WINDOW_GOOD) {

@@ -95,7 +95,7 @@ static IW_APART bool scale_pair(int32_t values[IW_SIDES], int32_t limit) {
 }
 
 /// Checks the values of a request, independent of its client.
-static IW_APART iw_refusal_t refuse_values(const iw_config_t *config, const iw_drive_t *request) {
+static iw_refusal_t refuse_values(const iw_config_t *config, const iw_drive_t *request) {
     // A current limit has no sign.
     const int32_t lowest_mA = (config->current_role == IW_ROLE_SETPOINT) ? -IW_CURRENT_LIMIT_mA : 0;
     for (size_t side = 0; side < IW_SIDES; side++) {

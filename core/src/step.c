@@ -306,7 +306,7 @@ static bool turns(const iw_gateway_t *self, iw_side_t side) {
 
 /// Detects a machine that rolls away or is pushed by hand. Not while setpoints are sent: a zero is a command too, and
 /// braking wheels still turn.
-static IW_APART void watch_rolling(iw_gateway_t *self) {
+static void watch_rolling(iw_gateway_t *self) {
     const bool alone = self->setpoint.demand == IW_DEMAND_SILENCE;
     iw_rolling_step(&self->rolling, self->now_us, alone && (turns(self, IW_LEFT) || turns(self, IW_RIGHT)));
 }
