@@ -160,10 +160,10 @@ static IW_APART void judge_unit(iw_force_t *self) {
     }
 }
 
-/// Returns true if the wheel may have measured a person who leaned on it: nobody saw its start, and its offset differs
-/// from the stored one as by a load.
+/// Returns true if a wheel whose start nobody saw may have measured a person who leaned on it: its offset differs from
+/// the stored one as by a load. (After a good window of an observed start, the offset is no longer IW_OFFSET_STORED.)
 static bool may_be_load(const iw_force_t *self) {
-    return !self->boot_seen && self->provenance == IW_OFFSET_STORED &&
+    return self->provenance == IW_OFFSET_STORED &&
            far_from_offset(self, self->wheel_offset_dN * 100, IW_FORCE_SHIFT_mN);
 }
 
@@ -186,7 +186,7 @@ static IW_APART void settle(iw_force_t *self, iw_time_us_t now_us) {
 void iw_force_restore(iw_force_t *self, iw_offset_provenance_t provenance, int32_t offset_mN) {
     // The wheel's offset may have come before the answer of the store: then settle compares the two now.
     if (self->provenance == IW_OFFSET_WHEEL && !self->boot_seen) {
-        self->provenance = IW_OFFSET_NONE;
+        self->provenance = IW_OFFSET_STORED;
     }
     if (self->provenance < provenance || self->provenance == IW_OFFSET_STORED) {
         adopt(self, IW_NEVER, provenance, offset_mN);

@@ -102,6 +102,7 @@ TEST(test_force_unseen_wheel_offset_is_doubted_beyond_5_N) {
                 assert_offset(IW_OFFSET_WHEEL, 5000);
             }
             iw_force_restore(&rig.force, IW_OFFSET_STORED, stored_mN);
+            TEST_ASSERT_EQUAL_UINT64(IW_NEVER, rig.force.offset_us);
             if (order == 0) {
                 force_rig_offset(&rig, 50);
             }
