@@ -49,7 +49,7 @@ bool iwn_target_permits(iwn_server_t *server, iwn_client_t *client) {
     }
     if (self->restart_us != 0U) {
         return IWN_REFUSE(&server->refusal, IWN_DENIED,
-                          "a configuration was committed: the gateway restarts with it, then arm");
+                          "a configuration was committed: arm after the restart (if latched, reset first)");
     }
     if (!brd_host_is_configured(self)) {
         return false;

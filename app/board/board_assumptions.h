@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 /// Learned facts about the wheels, from one run of the board to the next: entries of the assumption store, and the
 /// offsets of the forces. The rules are those of the daemon (docs/developer/ledger.md): facts that were found for other
-/// settings are dropped, any offset that this run measures replaces a stored one, and only a tare replaces a tare.
+/// settings are dropped, a stored offset is replaced as iwheel/force_offset.h says, and only a tare replaces a tare.
 ///
 ///     start: record --> the core
 ///     run:   a fact changes --> nothing is sent for BRD_ASSUMPTIONS_PERIOD_US --> a record

@@ -35,7 +35,7 @@ static bool configure(brd_host_t *self, iwn_text_t *why, iwn_error_t *out_error)
     }
     *out_error = IWN_DENIED;
     if (!brd_host_is_silent(self)) {
-        iwn_text_add(why, "the flash is written only while nothing is sent: stop, and wait");
+        iwn_text_add(why, "the flash is written only while listening: stop or reset, and wait");
         return false;
     }
     *out_error = IWN_INTERNAL;

@@ -160,6 +160,11 @@ static IW_APART void judge_unit(iw_force_t *self) {
     }
 }
 
+static bool unit_contradicted(const iw_force_t *self) {
+    const iw_unit_observation_t other = (self->unit == IW_FORCE_CN) ? IW_UNIT_DN : IW_UNIT_CN;
+    return self->observation == other;
+}
+
 /// Returns true if a wheel whose start nobody saw may have measured a person who leaned on it: its offset differs from
 /// the stored one as by a load. (After a good window of an observed start, the offset is no longer IW_OFFSET_STORED.)
 static bool may_be_load(const iw_force_t *self) {
@@ -176,7 +181,7 @@ static IW_APART void settle(iw_force_t *self, iw_time_us_t now_us) {
     if (!self->wheel_offset_received || !trusted || self->provenance == IW_OFFSET_OPERATOR) {
         return;
     }
-    if (!may_be_load(self)) {
+    if (!may_be_load(self) || unit_contradicted(self)) {
         adopt(self, now_us, IW_OFFSET_WHEEL, self->wheel_offset_dN * 100);
     } else {
         self->observation = IW_UNIT_UNCLEAR;
@@ -202,7 +207,9 @@ static void judge_window(iw_force_t *self, iw_time_us_t now_us) {
         far_from_offset(self, self->quality.mean_mN, IW_FORCE_SHIFT_mN)) {
         self->quality.window = IW_WINDOW_LOADED;
     }
-    if (self->quality.window == IW_WINDOW_GOOD && self->provenance < IW_OFFSET_ESTIMATED) {
+    // Without its start in sight, a light load would move the stored offset a little each time.
+    const bool better = self->provenance == IW_OFFSET_NONE || (self->provenance == IW_OFFSET_STORED && self->boot_seen);
+    if (self->quality.window == IW_WINDOW_GOOD && better) {
         adopt(self, now_us, IW_OFFSET_ESTIMATED, self->quality.mean_mN);
     }
     settle(self, now_us);
@@ -260,11 +267,6 @@ iw_tare_t iw_force_tare(iw_force_t *self, iw_time_us_t now_us) {
         adopt(self, now_us, IW_OFFSET_OPERATOR, quality.mean_mN);
     }
     return result;
-}
-
-static bool unit_contradicted(const iw_force_t *self) {
-    const iw_unit_observation_t other = (self->unit == IW_FORCE_CN) ? IW_UNIT_DN : IW_UNIT_CN;
-    return self->observation == other;
 }
 
 iw_force_validity_t iw_force_validity(const iw_force_t *self, iw_time_us_t now_us) {

@@ -26,8 +26,8 @@ static const babble_t babbles[] = {
 
 typedef struct {
     const char *name;
-    event_kind_t kind;
-    uint8_t who; ///< A wheel, or 2: both.
+    uint8_t kind; ///< An event_kind_t.
+    uint8_t who;  ///< A wheel, or 2: both.
     int32_t a;
     iw_cause_t stop; ///< The cause that must stop the wheels.
 } follow_t;

@@ -43,9 +43,10 @@ TEST(test_channel_of_a_relay_that_sends_alive_stays_open) {
 /// Starts the host with another lease than the gateway and connects its relay.
 static void start_with_lease(uint16_t lease_ms) {
     memset(&host, 0, sizeof host);
+    rig.gateway.config.lease_ms = lease_ms;
     brd_host_init(&host, &place, rig.now_us);
-    TEST_ASSERT_EQUAL_UINT32(rig.config.lease_ms * 1000U, host.lease_us);
-    host.lease_us = lease_ms * 1000U;
+    rig.gateway.config.lease_ms = rig.config.lease_ms;
+    TEST_ASSERT_EQUAL_UINT32(lease_ms * 1000U, host.lease_us);
     say(0, "{\"cmd\":\"link\"}");
     say(0, "{\"cmd\":\"open\",\"channel\":1,\"watch\":false}");
     run_ms(20);

@@ -164,6 +164,41 @@ TEST(test_stored_contradiction_that_comes_late_is_reported) {
     TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"arm\"}"), "mount_sign_left is contradicted"));
 }
 
+/// The file process waits for the disk, and this run does not: what a person does meanwhile is newer than the file.
+TEST(test_late_file_does_not_replace_what_the_operator_did) {
+    gw_assumptions_t *assumptions = &daemon_rig.daemon->assumptions;
+    daemon_rig_run(3000);
+    TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"tare\"}"), "\"ok\":true"));
+    TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"confirm\",\"item\":\"mount_sign_left\"}"),
+                                "\"state\":\"confirmed\""));
+    const int32_t tared_mN = assumptions->known.offset[IW_LEFT].offset_mN;
+    store(IW_ASSUMPTION_MOUNT_SIGN_LEFT, IW_CONTRADICTED, IW_SOURCE_OPERATOR);
+    store(IW_ASSUMPTION_MOUNT_SIGN_RIGHT, IW_CONFIRMED, IW_SOURCE_OPERATOR);
+    store_offset(IW_LEFT, config()->force_unit[IW_LEFT], tared_mN + 9000);
+    assumptions->store.waits = true;
+    length = gw_assumptions_file_write(&stored, daemon_rig.daemon->config.bus.interface, text, sizeof text);
+    news = GW_FILE_STORE_READ;
+    daemon_rig_run(50);
+    TEST_ASSERT_EQUAL_INT(IW_CONFIRMED, entry(IW_ASSUMPTION_MOUNT_SIGN_LEFT)->state);
+    TEST_ASSERT_EQUAL_INT(IW_CONFIRMED, entry(IW_ASSUMPTION_MOUNT_SIGN_RIGHT)->state);
+    TEST_ASSERT_EQUAL_INT32(tared_mN, assumptions->known.offset[IW_LEFT].offset_mN);
+    TEST_ASSERT_EQUAL_INT32(tared_mN, daemon_rig.daemon->wheels.core.force[IW_LEFT].offset_mN);
+}
+
+/// The file has values that this run does not know.
+TEST(test_close_before_the_file_is_read_does_not_overwrite_it) {
+    gw_assumptions_t *assumptions = &daemon_rig.daemon->assumptions;
+    daemon_rig_run(3000);
+    TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"tare\"}"), "\"ok\":true"));
+    writes = 0;
+    for (unsigned loading = 0; loading < 2U; loading++) {
+        assumptions->changed = true;
+        assumptions->state = (loading == 0U) ? GW_ASSUMPTIONS_LOADING : GW_ASSUMPTIONS_STORED;
+        gw_assumptions_close(assumptions);
+        TEST_ASSERT_EQUAL_UINT(loading, writes);
+    }
+}
+
 /// No cause of a stop names a contradiction: docs/developer/ledger.md promises the next arm.
 TEST(test_contradiction_during_a_drive_takes_effect_at_the_next_arm) {
     daemon_rig_begin_driving(client);

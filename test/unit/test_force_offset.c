@@ -113,6 +113,15 @@ TEST(test_force_unseen_wheel_offset_is_doubted_beyond_5_N) {
     }
 }
 
+/// The wrong unit explains the difference.
+TEST(test_force_doubted_offset_does_not_hide_a_contradicted_unit) {
+    iw_force_restore(&rig.force, IW_OFFSET_STORED, 1000);
+    force_rig_quiet(&rig, 40, 100);
+    force_rig_offset(&rig, 100);
+    assert_offset(IW_OFFSET_WHEEL, 10000);
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_UNIT_CONTRADICTED, force_rig_validity(&rig));
+}
+
 TEST(test_force_seen_wheel_offset_is_not_replaced_by_a_stored_one) {
     force_rig_quiet(&rig, 40, 510);
     iw_force_reopen(&rig.force, true);
@@ -183,7 +192,7 @@ TEST(test_force_reboot_resets_observation_and_offset_of_the_wheel) {
     TEST_ASSERT_EQUAL_INT32(0, rig.force.observed_permille);
     force_rig_quiet(&rig, 40, 900);
     TEST_ASSERT_EQUAL_INT(IW_UNIT_UNKNOWN, rig.force.observation);
-    assert_offset(IW_OFFSET_ESTIMATED, 9000);
+    assert_offset(IW_OFFSET_STORED, 10000);
 }
 
 TEST(test_force_tare_uses_the_mean_of_the_last_two_seconds) {

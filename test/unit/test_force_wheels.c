@@ -161,6 +161,29 @@ TEST(test_force_unobserved_loaded_start_retains_the_stored_offset) {
     }
 }
 
+/// The person has left before the gateway measures: its own mean is good, and the wheel's offset is not.
+TEST(test_force_load_that_ended_before_the_gateway_retains_the_stored_offset) {
+    static const int32_t loads_mN[] = {12000, 60000, 150000};
+    for (size_t i = 0; i < sizeof loads_mN / sizeof loads_mN[0]; i++) {
+        world_rig_begin(&rig, 0);
+        sim_world_power(&rig.world, rig.now_us, false);
+        load_both(loads_mN[i]);
+        world_rig_run(&rig, 2U * SECOND);
+        sim_world_power(&rig.world, rig.now_us, true);
+        world_rig_run(&rig, 10U * SECOND);
+        load_both(0);
+        world_rig_restart(&rig);
+        iw_gateway_restore_offset(&rig.gateway, IW_LEFT, IW_OFFSET_STORED, LEFT_ZERO_mN);
+        world_rig_run(&rig, 10U * SECOND);
+        TEST_ASSERT_EQUAL_INT(IW_WINDOW_GOOD, force(IW_LEFT)->quality.window);
+        assert_zero(IW_LEFT, IW_OFFSET_STORED, LEFT_ZERO_mN);
+        TEST_ASSERT_INT32_WITHIN(1000, 0, iw_force_net_mN(force(IW_LEFT)));
+        TEST_ASSERT_EQUAL_INT(IW_FORCE_OFFSET_DOUBTED, validity(IW_LEFT));
+        assert_tare(IW_TARE_OK, IW_LEFT);
+        TEST_ASSERT_EQUAL_INT(IW_FORCE_VALID, validity(IW_LEFT));
+    }
+}
+
 TEST(test_force_unobserved_start_without_load_uses_the_wheels_offset) {
     world_rig_begin(&rig, 0);
     world_rig_run(&rig, 10U * SECOND);

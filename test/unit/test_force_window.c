@@ -219,7 +219,7 @@ TEST(test_force_saturated_sample_contaminates_the_window) {
 TEST(test_force_5_N_from_a_stored_offset_is_a_load) {
     static const int32_t stored_mN[] = {-5000, 5000, -5001, 5001};
     for (size_t i = 0; i < 4; i++) {
-        begin(IW_LEFT, false);
+        begin(IW_LEFT, true);
         iw_force_restore(&rig.force, IW_OFFSET_STORED, stored_mN[i]);
         force_rig_quiet(&rig, 40, 0);
         const bool loaded = i >= 2;
@@ -227,6 +227,16 @@ TEST(test_force_5_N_from_a_stored_offset_is_a_load) {
         TEST_ASSERT_EQUAL_INT(loaded ? IW_OFFSET_STORED : IW_OFFSET_ESTIMATED, rig.force.provenance);
         TEST_ASSERT_EQUAL_INT32(loaded ? stored_mN[i] : 0, rig.force.offset_mN);
     }
+}
+
+TEST(test_force_estimate_of_an_unseen_start_leaves_a_stored_offset) {
+    begin(IW_LEFT, false);
+    iw_force_restore(&rig.force, IW_OFFSET_STORED, 4000);
+    force_rig_quiet(&rig, 40, 0);
+    TEST_ASSERT_EQUAL_INT(IW_WINDOW_GOOD, rig.force.quality.window);
+    TEST_ASSERT_EQUAL_INT(IW_OFFSET_STORED, rig.force.provenance);
+    TEST_ASSERT_EQUAL_INT32(4000, rig.force.offset_mN);
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_VALID, force_rig_validity(&rig));
 }
 
 TEST(test_force_noise_far_from_a_stored_offset_is_noise) {

@@ -120,7 +120,8 @@ static void merge_item(gw_assumptions_t *self, iw_assumption_item_t item, const 
     const iw_assumption_entry_t *present = &gw_wheels_snapshot(self->wheels).assumed[item];
     char value[IWN_VALUE_SIZE];
     inspect_assumption_value(&self->configured, item, value);
-    if (stored->entry.state == IW_ASSUMED || present->state == IW_CONTRADICTED) {
+    const bool newer = present->state != IW_ASSUMED && present->source == IW_SOURCE_OPERATOR;
+    if (stored->entry.state == IW_ASSUMED || present->state == IW_CONTRADICTED || newer) {
         return;
     }
     if (strcmp(value, stored->value) != 0) {
@@ -138,7 +139,8 @@ static void merge_item(gw_assumptions_t *self, iw_assumption_item_t item, const 
 }
 
 static void merge_offset(gw_assumptions_t *self, iw_side_t side, const gw_stored_offset_t *stored) {
-    if (stored->from == IW_OFFSET_NONE) {
+    const bool newer = self->wheels->core.force[side].provenance == IW_OFFSET_OPERATOR;
+    if (stored->from == IW_OFFSET_NONE || newer) {
         return;
     }
     if (stored->unit != self->configured.core->force_unit[side]) {
@@ -289,7 +291,8 @@ void gw_assumptions_describe_contradiction(const gw_assumptions_t *self, iw_assu
 }
 
 void gw_assumptions_close(gw_assumptions_t *self) {
-    if (self->answered && self->changed) {
+    // A file that has not been read yet has values that this run does not know: it stays as it is.
+    if (self->answered && self->changed && self->state != GW_ASSUMPTIONS_LOADING) {
         self->store.waits = false; // The result of an outstanding write no longer matters.
         hand_over(self);
     }

@@ -11,9 +11,10 @@
 ///       +--- wheel rebooted
 ///
 /// Order of trust: OPERATOR (tare) > WHEEL > ESTIMATED > STORED > NONE. An offset replaces a less trusted one. In
-/// addition WHEEL replaces an older WHEEL, a tare replaces an older tare, and every offset replaces a STORED one. After
-/// a reboot WHEEL and ESTIMATED become STORED. If the start of the wheel was observed, the core uses the wheel's offset
-/// only after its own window over the same two seconds was judged GOOD.
+/// addition WHEEL replaces an older WHEEL, and a tare replaces an older tare. After a reboot WHEEL and ESTIMATED become
+/// STORED. If the start of the wheel was observed, the core uses the wheel's offset only after its own window over the
+/// same two seconds was judged GOOD. If it was not, a STORED offset is replaced only by a tare, or by an offset of the
+/// wheel within IW_FORCE_SHIFT_mN of it.
 ///
 /// Observation of the unit: at standstill, raw value by the wheel's offset in dN is about 10 (cN), 1 (dN) or 0
 /// (offset already removed). Its effect on the force:
@@ -106,7 +107,8 @@ typedef enum {
     IW_FORCE_NO_OFFSET,
     IW_FORCE_UNIT_CONTRADICTED,
     IW_FORCE_OFFSET_REMOVED, ///< The wheel seems to subtract the offset itself.
-    IW_FORCE_OFFSET_DOUBTED, ///< The core's mean and the wheel's offset disagree: one was measured under load.
+    IW_FORCE_OFFSET_DOUBTED, ///< The wheel's offset disagrees with the core's mean or with the stored offset: one of the
+                             ///< two was measured under load.
 } iw_force_validity_t;
 
 /// Statistics of a window of samples.
@@ -147,8 +149,7 @@ void iw_force_init(iw_force_t *self, iw_force_unit_t unit);
 void iw_force_reopen(iw_force_t *self, bool boot_seen);
 
 /// Restores an offset of an earlier run, unless this run has a better one. `provenance` IW_OFFSET_OPERATOR restores a
-/// tare, which only the next tare replaces; any other value restores IW_OFFSET_STORED, which every offset replaces,
-/// except one of the wheel that differs by more than IW_FORCE_SHIFT_mN if the start of the wheel was not observed.
+/// tare, which only the next tare replaces; any other value restores IW_OFFSET_STORED.
 /// Sets `offset_us` to IW_NEVER. `offset_mN` is within +/- IW_FORCE_OFFSET_MAX_mN.
 void iw_force_restore(iw_force_t *self, iw_offset_provenance_t provenance, int32_t offset_mN);
 
