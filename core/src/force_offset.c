@@ -21,7 +21,7 @@ static int32_t scale_mN(const iw_force_t *self) {
 }
 
 /// The limits of 16 bits are the sensor's limits, not a force.
-static bool saturated(int16_t raw) {
+static IW_APART bool saturated(int16_t raw) {
     return raw == INT16_MIN || raw == INT16_MAX;
 }
 
@@ -123,11 +123,11 @@ iw_force_quality_t iw_force_measure(const iw_force_t *self) {
     return quality;
 }
 
-static bool far_from_offset(const iw_force_t *self, int32_t mean_mN, uint32_t limit_mN) {
+static IW_APART bool far_from_offset(const iw_force_t *self, int32_t mean_mN, uint32_t limit_mN) {
     return iw_abs(mean_mN - self->offset_mN) > (int32_t)limit_mN;
 }
 
-static IW_APART bool within(int32_t difference, int32_t whole, int32_t percent) {
+static bool within(int32_t difference, int32_t whole, int32_t percent) {
     return iw_abs(difference) * 100 <= whole * percent;
 }
 
@@ -208,8 +208,8 @@ static void judge_window(iw_force_t *self, iw_time_us_t now_us) {
         self->quality.window = IW_WINDOW_LOADED;
     }
     // Without its start in sight, a light load would move the stored offset a little each time.
-    const bool better = self->provenance == IW_OFFSET_NONE || (self->provenance == IW_OFFSET_STORED && self->boot_seen);
-    if (self->quality.window == IW_WINDOW_GOOD && better) {
+    const bool kept = known && !self->boot_seen;
+    if (self->quality.window == IW_WINDOW_GOOD && self->provenance < IW_OFFSET_ESTIMATED && !kept) {
         adopt(self, now_us, IW_OFFSET_ESTIMATED, self->quality.mean_mN);
     }
     settle(self, now_us);
