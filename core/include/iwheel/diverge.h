@@ -66,8 +66,8 @@ void iw_diverge_init(iw_diverge_t *self, const iw_config_t *config);
 /// Reports the start time of the present drive. If it is a new drive, sets the deviation and the largest one to zero.
 void iw_diverge_begin(iw_diverge_t *self, iw_time_us_t begun_us);
 
-/// Sets the deviation to zero while nothing is compared: the core does not drive, a wheel is lost, or a stop without ramp
-/// is active. The expected speeds continue from the measured ones, `largest_um` stays.
+/// Sets the deviation to zero while nothing is compared: the core does not drive, a wheel is lost, or a stop without
+/// ramp is active. The expected speeds continue from the measured ones, `largest_um` stays.
 void iw_diverge_restart(iw_diverge_t *self, iw_time_us_t now_us);
 
 /// Sets the measured speed of a wheel in the machine's frame, limited to +/- 40 000 mm/s. `side`: an iw_side_t, not

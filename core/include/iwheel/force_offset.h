@@ -107,8 +107,8 @@ typedef enum {
     IW_FORCE_NO_OFFSET,
     IW_FORCE_UNIT_CONTRADICTED,
     IW_FORCE_OFFSET_REMOVED, ///< The wheel seems to subtract the offset itself.
-    IW_FORCE_OFFSET_DOUBTED, ///< The wheel's offset disagrees with the core's mean or with the stored offset: one of the
-                             ///< two was measured under load.
+    /// The wheel's offset disagrees with the core's mean or with the stored offset: one was measured under load.
+    IW_FORCE_OFFSET_DOUBTED,
 } iw_force_validity_t;
 
 /// Statistics of a window of samples.
