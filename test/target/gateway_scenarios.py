@@ -471,11 +471,17 @@ def hardware_watchdog(rig):
 
 def change_stored(flash, old, new):
     """Replaces the first value `old` in the newest record, with its CRC, as if another version had stored it."""
-    slots = (flash.memory[at : at + 256] for at in range(0, len(flash.memory), 256))
-    records = [(int.from_bytes(slot[:4], "little"), at) for at, slot in enumerate(slots)]
-    at = 256 * max(record for record in records if record[0] != 0xFFFFFFFF)[1]
-    slot = bytes(flash.memory[at : at + 252]).replace(old.to_bytes(2, "little"), new.to_bytes(2, "little"), 1)
-    flash.memory[at : at + 256] = slot + zlib.crc32(slot).to_bytes(4, "little")
+    size = flash.word_bytes
+    stored = b"".join(flash.memory[at : at + 4] for at in range(0, len(flash.memory), size))
+    slots = [stored[at : at + 256] for at in range(0, len(stored), 256)]
+    sequences = [int.from_bytes(slot[:4], "little") for slot in slots]
+    newest = max((sequence, at) for at, sequence in enumerate(sequences) if sequence != 0xFFFFFFFF)[1]
+    slot = slots[newest][:252].replace(old.to_bytes(2, "little"), new.to_bytes(2, "little"), 1)
+    slot += zlib.crc32(slot).to_bytes(4, "little")
+    for word in range(64):
+        value = slot[4 * word : 4 * word + 4]
+        at = (64 * newest + word) * size
+        flash.memory[at : at + size] = (value + bytes(byte ^ 0xFF for byte in value))[:size]
 
 
 def refused_record(rig):

@@ -618,6 +618,8 @@ class Flash:
     `cut_after`: power fails during the operation of that number from now on, which gets half of its bits through; `next_cut` is the
     same for the time after the next power-on."""
 
+    word_bytes = 4  # Size of a word of the store.
+
     def __init__(self, chip):
         self.chip, self.memory = chip, bytearray(b"\xff" * self.size)
         self.operations, self.erasures, self.cut_after, self.next_cut = 0, 0, None, None

@@ -135,6 +135,7 @@ class FlashG4(chip.Flash):
     them raises the NMI. `eccr_lost`: the operation that was cut off has damaged ECCR too (ES0430 2.2.3)."""
 
     base, size, lock, unit, program_ns, erase_ns = 0x0807E000, 0x2000, 1 << 31, 4, 85 * US, 25 * MS
+    word_bytes = 8  # Each word of the store is written with its inverse.
     two_banks = True  # The option DBANK.
 
     def __init__(self, machine):
