@@ -139,7 +139,7 @@ static void merge_item(gw_assumptions_t *self, iw_assumption_item_t item, const 
 }
 
 static void merge_offset(gw_assumptions_t *self, iw_side_t side, const gw_stored_offset_t *stored) {
-    const bool newer = self->wheels->core.force[side].provenance == IW_OFFSET_OPERATOR;
+    const bool newer = gw_wheels_snapshot(self->wheels).wheel[side].force->provenance == IW_OFFSET_OPERATOR;
     if (stored->from == IW_OFFSET_NONE || newer) {
         return;
     }
