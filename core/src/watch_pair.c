@@ -31,7 +31,7 @@ static bool has_ended(const iw_gateway_t *self) {
 
 void iw_watch_pair(iw_gateway_t *self, const iw_pair_t *applied, bool online) {
     iw_diverge_t *const diverge = &self->diverge;
-    const bool lost = (self->permit.raised & (1U << IW_CAUSE_WHEEL_LOST)) != 0U;
+    const bool lost = (self->permit.raised & (1U << (uint32_t)IW_CAUSE_WHEEL_LOST)) != 0U;
     iw_diverge_begin(diverge, self->permit.armed_us);
     if (has_ended(self) || self->setpoint.from_zero || lost) {
         iw_diverge_restart(diverge, self->now_us);
