@@ -202,7 +202,7 @@ def back_after_kill(pair):
 
 def measure(build):
     """Rows of (metric, figure, goal)."""
-    with tempfile.TemporaryDirectory(prefix="iwheel-bench-") as folder:
+    with tempfile.TemporaryDirectory(prefix="iwheel-bench-", ignore_cleanup_errors=True) as folder:
         pair = Pair(build, folder)
         try:
             Client(pair.northbound).close()

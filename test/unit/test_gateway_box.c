@@ -6,6 +6,7 @@
 
 #include "iwheel_linux/clock.h"
 
+#include "box_end.h"
 #include "unit.h"
 #include <dirent.h>
 #include <errno.h>
@@ -18,7 +19,6 @@
 #include <sys/mman.h>
 #include <sys/mount.h>
 #include <sys/stat.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #define CONFIG "[record]\nblackbox_s = 2\n"
@@ -52,7 +52,7 @@ void setUp(void) {
 void tearDown(void) {
     char command[128];
     if (open_box) {
-        gw_box_close(&box);
+        box_end(&box);
         open_box = false;
     }
     (void)umount2(config.record.directory, MNT_DETACH);
@@ -277,7 +277,7 @@ TEST(test_writer_has_no_open_file_after_a_recording) {
 TEST(test_recording_number_continues_after_a_restart) {
     start();
     record("wheel_lost", 0);
-    gw_box_close(&box);
+    box_end(&box);
     start();
     record("bus_down", 0);
     TEST_ASSERT_NOT_NULL(strstr(box.last.path, "stop-000002-bus_down.log"));
@@ -433,7 +433,7 @@ TEST(test_result_of_a_recording_is_logged) {
     line("estop_line", text, sizeof text);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "stop 3 is recorded in "), text);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "stop-000001-estop_line.log (10 frames, "), text);
-    gw_box_close(&box);
+    box_end(&box);
     (void)snprintf(config.record.directory, sizeof config.record.directory, "%s/no/such/folder", folder);
     start();
     line(NULL, text, sizeof text);
@@ -518,12 +518,8 @@ TEST(test_kill_of_the_gateway_is_recorded_only_while_sending) {
         atomic_store(&box.ring->sending, sending != 0);
         (void)close(box.writer.fd); // Same effect as a kill
         box.writer.fd = -1;
-        gw_box_close(&box);
+        box_end(&box);
         open_box = false;
-        for (unsigned i = 0; i < 100U && kill(box.writer.pid, 0) == 0; i++) {
-            (void)usleep(50000);
-            (void)waitpid(box.writer.pid, NULL, WNOHANG);
-        }
     }
     TEST_ASSERT_EQUAL(3, count_files());
     read_file("stop-000001-gateway_died.jsonl", text, sizeof text);

@@ -5,6 +5,7 @@
 
 #include "iwheel_northbound/line.h"
 
+#include "box_end.h"
 #include "unit.h"
 #include <fcntl.h>
 #include <poll.h>
@@ -299,7 +300,7 @@ TEST(test_reader_refusal_after_a_longer_reply_has_its_own_length) {
     wait_for_answer(GW_CHILD_MESSAGE);
     TEST_ASSERT_EQUAL(IWN_DENIED, box.answer.error);
     TEST_ASSERT_EQUAL(box.answer.length, strlen(box.answer.text));
-    gw_box_close(&box);
+    box_end(&box);
 }
 
 TEST(test_reader_frozen_process_does_not_block_the_gateway) {
@@ -324,7 +325,7 @@ TEST(test_reader_frozen_process_does_not_block_the_gateway) {
     box.reader.started_us = 0;
     TEST_ASSERT_TRUE(gw_box_ask(&box, &question));
     wait_for_answer(GW_CHILD_MESSAGE);
-    gw_box_close(&box);
+    box_end(&box);
 }
 
 TEST(test_reader_without_recordings_has_no_process) {
@@ -333,5 +334,5 @@ TEST(test_reader_without_recordings_has_no_process) {
     TEST_ASSERT_EQUAL(-1, box.reader.fd);
     TEST_ASSERT_FALSE(gw_box_ask(&box, &question));
     TEST_ASSERT_EQUAL(GW_CHILD_SILENT, gw_box_receive(&box));
-    gw_box_close(&box);
+    box_end(&box);
 }

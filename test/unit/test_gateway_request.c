@@ -7,6 +7,7 @@
 
 #include "iwheel_linux/clock.h"
 
+#include "box_end.h"
 #include "unit.h"
 #include <dirent.h>
 #include <errno.h>
@@ -40,7 +41,7 @@ void setUp(void) {
 
 void tearDown(void) {
     char command[128];
-    gw_box_close(&box);
+    box_end(&box);
     sock_log_close(&log_);
     (void)snprintf(command, sizeof command, "rm -rf %s", folder);
     TEST_ASSERT_EQUAL(0, system(command));
@@ -149,7 +150,9 @@ TEST(test_request_is_described_with_its_limits) {
 TEST(test_request_is_on_the_disk_while_it_runs) {
     begin();
     put_frame(2);
-    (void)usleep(700000);
+    for (unsigned i = 0; i < 100U && strstr(read_file("stop-000001-requested.log"), "100#00020000") == NULL; i++) {
+        (void)usleep(100000);
+    }
     assert_has(read_file("stop-000001-requested.log"), "100#00020000");
     end();
 }
@@ -205,15 +208,12 @@ TEST(test_stop_during_a_request_is_recorded_and_spares_it) {
 TEST(test_request_ends_with_the_gateway) {
     begin();
     put_frame(9);
-    gw_box_close(&box);
-    for (unsigned i = 0; i < 100U && kill(box.writer.pid, 0) == 0; i++) {
-        (void)usleep(20000);
-    }
+    box_end(&box);
     assert_has(read_file("stop-000001-requested.jsonl"), "{\"type\":\"end\",\"frames\":1}\n");
 }
 
 TEST(test_request_without_a_directory_reports_the_fault) {
-    gw_box_close(&box);
+    box_end(&box);
     (void)snprintf(records, sizeof records, "%s/no/such/folder", folder);
     const gw_box_config_t wanted = {
         .blackbox_s = 2, .keep_stops = 3, .directory = records, .bus = "can0", .estop = "none", .config = CONFIG};
