@@ -8,7 +8,6 @@ import select
 import shutil
 import signal
 import subprocess
-import sys
 import tempfile
 import time
 import traceback
@@ -21,7 +20,6 @@ from scenario import Skip
 from verdict import CRASH, Attempt, Failure, Session, explains, kind_of
 
 KINDS = ("latencies", "from_level")  # of the e-stop: since the edge, since the level
-SWITCH_S = 0.0005  # between threads of a test: a press does not wait for the recorder
 START_US = 1_000_000  # Limit of a restart in real time: fork and exec alone take 0.3 s in such a kernel on a busy machine.
 LIMIT_S, FULL_LIMIT_S, SOAK_LIMIT_S = 600, 3600, 100_000  # of one test, by the guest's clock
 
@@ -112,7 +110,6 @@ class GuestRun(Session):
 
     def watch(self):
         """In real time: from now on the witness runs in parallel, until `close`."""
-        sys.setswitchinterval(SWITCH_S)
         if not self.plan["native"]:  # a machine's own kernel is not changed
             hasten_received_frames()
         self.folder = tempfile.mkdtemp(prefix="iwheel-witness-")  # not next to the results: the host's files are slow

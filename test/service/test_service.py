@@ -513,8 +513,8 @@ class Strangers(unittest.TestCase):
         self.rig.start_gateway()
         with iwheel.Gateway(self.rig.path("gateway.sock"), wait=10) as gateway:
             gateway.arm("client").drive_for(0.6, 300, 300)
-            killed_us = now_us()
             self.rig.kill_gateway(signal.SIGKILL)
+            killed_us = now_us()
         stranger = self.rig.stranger("listening", names)
         self.rig.start_gateway(wheels=False)
         time.sleep(0.3)

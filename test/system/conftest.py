@@ -36,7 +36,7 @@ def pytest_verdict_end(run):
     """Invariant 2 limits the 99th percentile of all presses of row 11 together. If most of them are not timed, it is skipped."""
     every = presses(run)
     values = [latency_us for latency_us, stalled in every if not stalled]
-    if not every:
+    if not any("::row11" in name for name in run.passed):
         return
     figures, failures = [f"{len(every)} presses, {len(every) - len(values)} of them not timed (stalled)"], []
     if values:

@@ -22,6 +22,7 @@ from judge import Judge
 from judge_log import ESTOP_US, PAIR_REAL_US, Config, Event
 from verdict import die_with_parent
 
+sys.setswitchinterval(0.0005)  # s between threads of a test, default 0.005: a press does not wait for the recorder
 HERE = os.path.dirname(os.path.abspath(__file__))
 SERVICE_NICE = -10
 PACE = {"slow": 1}  # how many times slower than documented telemetry comes, where time is virtual: test/kernel/catalogue.py

@@ -14,6 +14,7 @@ from judge_log import (
     HOLD_MAX_US,
     JITTER_US,
     PAIR_US,
+    PRESS_US,
     RESIDUAL_US,
     RESIDUAL_ZERO_US,
     REST_RPM,
@@ -130,6 +131,8 @@ class Judge(Reading):
         if setpoint.t_us <= end_us:
             return
         if kind == "press":
+            if setpoint.t_us <= end_us + within_us:  # Not answered yet; `_estop` limits its latency.
+                return
             count = after_press.setdefault(end_us, [])
             count.append(setpoint)
             if len(count) > 1:
@@ -347,7 +350,8 @@ class Judge(Reading):
             if None in zeros:
                 self._say("estop_no_zero", event.t_us, "no zero pair after the e-stop")
                 continue
-            self.estop_latencies.append((event.t_us, max(zeros) - event.t_us))
+            if event.kind == "estop" or event.done_us - event.t_us <= PRESS_US:
+                self.estop_latencies.append((event.t_us, max(zeros) - event.t_us))
         if self.estop_latencies:
             count = len(self.estop_latencies)
             p99_us = percentile([latency_us for _, latency_us in self.estop_latencies], 99)

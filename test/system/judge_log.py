@@ -24,6 +24,7 @@ GAP_US = 100_000  # invariant 4
 PAIR_US = 5_000  # invariant 5: no two cycles are nearer to each other; 0.88 ms on a full bus
 PAIR_REAL_US = PAIR_US + 10_000  # of ordinary programs: the kernel may run another one between two frames of one call (docs/user/pair.md: 6.1 ms)
 ESTOP_US = 5_000  # invariant 2
+PRESS_US = 2_000  # a press that took longer to make has no known time
 JITTER_US = 10_000  # between the gateway's clock and the bus
 BUS_STALL_US = 5_500  # no telemetry for so long: the simulator waited for the processor
 REST_RPM = 2
@@ -233,7 +234,8 @@ class Reading:
             session.drives.append(event)
         kinds = {"stop": "ramp", "gone": "ramp", "ramp": "ramp", "press": "press", "estop": "press", "cut": "cut", "end": "killed"}
         if event.kind in kinds:
-            session.ends.append((event.t_us, kinds[event.kind], event.within_us))
+            answered_us = event.done_us - event.t_us if event.kind in ("stop", "press", "estop") else 0  # Before, it may not have been made.
+            session.ends.append((event.t_us, kinds[event.kind], max(event.within_us, answered_us)))
 
     def _lapse(self, session):
         """The lease ends on its own; a drive after that must have been refused."""

@@ -140,6 +140,11 @@ def only(side, change):
     return lambda frame: change(frame) if (frame.id == RIGHT) == bool(side) else frame
 
 
+def late_press(events):
+    """The test noted the time 50 ms before it pressed."""
+    return [e._replace(t_us=e.t_us - 50 * MS) if e.kind == "press" else e for e in events]
+
+
 def broken_at_exit(frames, events):
     """The last right setpoint is missing, and the gateway exits."""
     last = [frame for frame in frames if is_setpoint(frame)][-1]
@@ -199,6 +204,7 @@ def faults():
         "nonzero_after_estop",
     )
     yield "e-stop ignored until the end", between(f, 3_515, 5_100, with_data(1, 300)), e, "nonzero_after_estop"
+    yield "e-stop ignored after a late press", between(f, 3_515, 5_100, with_data(1, 300)), late_press(e), "nonzero_after_estop"
     yield "an old pair after the e-stop's zeros", add(f, *pair(4_105, 300, 300), *pair(4_110, 300, 300)), e, "nonzero_after_estop"
     yield "no zero at all after the e-stop", between(f, 3_520, 99_999, drop), e, "estop_no_zero"
     yield "motion after release and reset", add(f, *pair(5_450, 100, 100)), e, "sent_after_reset"
@@ -251,6 +257,7 @@ def goods():
         yield name, good(config), e, {"config": config}
     yield "foreign frames that the scenario itself sent", add(f, *(x._replace(own=True) for x in pair(12_000, 900, 900))), e, {}
     yield "one pair on its way at the e-stop", add(f, *pair(3_520.2, 300, 300)), e, {}
+    yield "a press that the test made 50 ms late", f, late_press(e), {}
     off = [Event(9_500 * MS, "dead"), Event(9_500 * MS, "cut", within_us=50 * MS), Event(12_000 * MS, "alive", 12_000 * MS)]
     yield (
         "one old frame per wheel and its zero",

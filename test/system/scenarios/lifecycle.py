@@ -21,8 +21,8 @@ def crash(t, number):
     t.arm(client)
     stream = Streamer(client, 400, 400)
     time.sleep(0.8)
-    killed_us = now_us()
     rig.kill_gateway(number)
+    killed_us = now_us()
     stream.stop()
     answered_ms = rig.start_gateway(wheels=False, restart_hold=True)
     limit_ms = rig.restart_us / 1000
