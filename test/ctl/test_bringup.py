@@ -12,6 +12,7 @@ import unittest
 
 from operator_at_terminal import Operator
 
+from bus import now_us
 from harness import Rig, children, find_program
 from verdict import hold
 
@@ -105,6 +106,10 @@ class Bringup(unittest.TestCase):
         """Setpoints on the bus that are no zeros."""
         time.sleep(0.05)
         return [frame for frame in self.rig.bus.setpoints() if frame[2] != 0]
+
+    def ramped_down_since(self, begin_us):
+        speeds = [speed for _, _, speed in self.rig.bus.setpoints(begin_us)]
+        return any(speeds) and speeds[-1] == 0
 
     def value(self, section, key):
         here = None
@@ -416,12 +421,13 @@ class Bringup(unittest.TestCase):
         operator.expect("did not start: a key was pressed", 2)
         self.assertFalse(self.moving(), "setpoints after a key that came before the motion")
         self.wait_until_stands()
+        begin_us = now_us()
         operator.answer("Try again?", "y")
         operator.expect("any key stops it")
         deadline = time.monotonic() + 10
-        while not (self.moving() and self.rig.bus.setpoints()[-1][2] == 0) and time.monotonic() < deadline:
-            operator.pump(0.02)
-        operator.type(" ")  # The zeros of the stop are still sent.
+        while not self.ramped_down_since(begin_us) and time.monotonic() < deadline:
+            operator.pump(0.005)
+        operator.type(" ")  # The zeros of the stop are still sent, for 0.2 s.
         operator.expect("STOPPED: a key was pressed", 3)
         operator.answer("Try again?", "q")
         self.assertEqual(1, self.leave(operator))
@@ -481,7 +487,7 @@ class Bringup(unittest.TestCase):
         self.killed = True
         self.assertEqual(1, len(os.listdir(self.runtime)))
         operator.process.kill()
-        killed_us = time.clock_gettime_ns(time.CLOCK_MONOTONIC) // 1000
+        killed_us = now_us()
         time.sleep(4.5)
         hold(not [frame for frame in self.moving() if frame[0] > killed_us + 1_000_000], "the wheels are commanded to turn after bringup is gone")
         last = max(frame[0] for frame in self.rig.bus.setpoints())

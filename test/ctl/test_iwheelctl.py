@@ -680,12 +680,12 @@ class Driving(WithGateway):
         after = [at for at in gateway.times("drive") if at > gateway.times("stop")[0]]
         self.assertEqual(drives_after, len(after))
 
-    def assert_spacing(self, gateway, seconds, most):
-        """Never more than `most` commands, and half of them that far apart or less, however slow the machine was now and then."""
+    def assert_spacing(self, gateway, seconds, most, late=1.5):
+        """Never more than `most` commands, and half of them that far apart or less, however slow the machine was now and then; at most `late` times it."""
         times = gateway.times("drive")
         spacing = statistics.median(after - before for before, after in itertools.pairwise(times))
         self.assertLessEqual(len(times), most)
-        self.assertTrue(0.8 * seconds < spacing < 1.5 * seconds, spacing)
+        self.assertTrue(0.8 * seconds < spacing < late * seconds, spacing)
 
     def test_drive_with_serial_commands_lost_ends_only_after_1_s(self):
         class Lossy(FakeGateway):
@@ -912,7 +912,7 @@ class Driving(WithGateway):
 
             gateway = self.serve(Odd)
             self.assertEqual(0, self.drive("1", "2", "--for", "200ms", gateway=gateway)[0])
-            self.assert_spacing(gateway, 0.0067, most=35)
+            self.assert_spacing(gateway, 0.0067, most=35, late=2.5)  # The next one that is possible is 20 ms.
 
     def test_json_prints_the_replies_to_arm_drive_and_stop(self):
         _, out, _, _ = self.ctl("--json", "drive", "1", "2", "--for", "100ms")
@@ -988,7 +988,7 @@ class Watching(WithGateway):
 
         gateway = self.serve(Flood)
         process = start("--socket", gateway.path, "watch")
-        wait_until(lambda: gateway.done)  # The output of iwheelctl is not read, but iwheelctl still receives all events.
+        wait_until(lambda: gateway.done, 60)  # The output of iwheelctl is not read, but iwheelctl still receives all events.
         time.sleep(0.2)
         lines = []
         while not lines or lines[-1].get("number") != Flood.total - 1:

@@ -91,7 +91,7 @@ class Parts:
         command = tuple(command)
         unchanged = self.unchanged(command)
         if changed is None:
-            found = re.search(r":test_\w+:FAIL.*", unchanged.output)  # With its message, because nobody expects it.
+            found = re.search(r":test_\w+:FAIL.*", unchanged.output)  # With its message, because it is never expected.
             return f"{Path(command[0]).name}{found[0]}" if found else first_failure(unchanged)
         program = changed.parent / Path(command[0]).name
         why = self.link(program.name, source, changed, program)

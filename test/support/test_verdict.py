@@ -296,13 +296,17 @@ class Processes(unittest.TestCase):
     def test_sleepers_notice_a_stalled_machine_and_end(self):
         witness = verdict.Witness()
         try:
-            time.sleep(0.5)
-            begin_us = verdict.now_us()
-            os.kill(witness.process.pid, 19)
-            time.sleep(0.2)
-            os.kill(witness.process.pid, 18)
-            time.sleep(0.2)
-            late = [late_us for _, late_us in witness.stalls(begin_us, verdict.now_us())]
+            late = []
+            for _ in range(10):  # Until the sleepers have started.
+                time.sleep(0.5)
+                begin_us = verdict.now_us()
+                os.kill(witness.process.pid, 19)
+                time.sleep(0.2)
+                os.kill(witness.process.pid, 18)
+                time.sleep(0.2)
+                late = [late_us for _, late_us in witness.stalls(begin_us, verdict.now_us())]
+                if any(late_us > 150_000 for late_us in late):
+                    break
             self.assertTrue([late_us for late_us in late if late_us > 150_000], late)
             self.assertGreater(min(late), 5_000, "a sleeper on time writes nothing")
         finally:

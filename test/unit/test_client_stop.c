@@ -19,7 +19,7 @@
 #include <unistd.h>
 
 #define HELLO "{\"event\":\"hello\",\"name\":\"iwheel-gateway\",\"api\":1,\"state\":\"listening\",\"client\":7}\n"
-#define SHORT 20   ///< ms; nobody answers in this time.
+#define SHORT 20   ///< ms; no answer comes in this time.
 #define LONG  2000 ///< ms; what is expected comes earlier, but the machine may be busy.
 
 static iwc_t *gateway;
@@ -190,8 +190,18 @@ static void end(pid_t child) {
     (void)waitpid(child, NULL, 0);
 }
 
-#define STOPPED "{\"id\":2,\"ok\":true,\"state\":\"stopping\"}\n{\"id\":4,\"ok\":true,\"state\":\"stopping\"}\n"
-#define CROWD   "{\"id\":null,\"ok\":false,\"error\":\"too_many_clients\",\"message\":\"close another one\"}\n"
+/// Returns the replies to all requests with which a client can begin: it repeats them if the machine is busy.
+static const char *replies(const char *state) {
+    static char text[4096];
+    size_t length = 0;
+    for (int id = 2; length + 64U < sizeof text; id += 2) {
+        length += (size_t)snprintf(text + length, sizeof text - length, "{\"id\":%d,\"ok\":true,\"state\":\"%s\"}\n",
+                                   id, state);
+    }
+    return text;
+}
+
+#define CROWD "{\"id\":null,\"ok\":false,\"error\":\"too_many_clients\",\"message\":\"close another one\"}\n"
 
 static bool reply_has(const char *state) {
     iwc_message_t reply;
@@ -199,7 +209,7 @@ static bool reply_has(const char *state) {
 }
 
 static void test_stop_at_sends_its_line_without_a_greeting(void) {
-    const pid_t child = serve(drive_path, STOPPED);
+    const pid_t child = serve(drive_path, replies("stopping"));
     TEST_ASSERT_EQUAL(IWC_OK, iwc_stop_at(gateway, drive_path, LONG));
     TEST_ASSERT_TRUE(reply_has("stopping"));
     TEST_ASSERT_EQUAL_INT(-1, iwc_fd(gateway));
@@ -207,19 +217,18 @@ static void test_stop_at_sends_its_line_without_a_greeting(void) {
 }
 
 static void test_stop_at_missing_socket_uses_the_other_one(void) {
-    pid_t child = serve(watch_path,
-                        "{\"id\":4,\"ok\":true,\"state\":\"latched\"}\n{\"id\":2,\"ok\":true,\"state\":\"latched\"}\n");
+    pid_t child = serve(watch_path, replies("latched"));
     TEST_ASSERT_EQUAL(IWC_OK, iwc_estop_at(gateway, drive_path, "stairs\n\xFC", LONG));
     end(child);
     (void)unlink(watch_path);
-    child = serve(drive_path, STOPPED);
+    child = serve(drive_path, replies("stopping"));
     TEST_ASSERT_EQUAL(IWC_OK, iwc_stop_at(gateway, watch_path, LONG));
     end(child);
 }
 
 static void test_stop_at_full_socket_uses_the_other_one(void) {
     const pid_t full = serve(drive_path, CROWD);
-    const pid_t child = serve(watch_path, "{\"id\":4,\"ok\":true,\"state\":\"stopping\"}\n");
+    const pid_t child = serve(watch_path, replies("stopping"));
     TEST_ASSERT_EQUAL(IWC_OK, iwc_stop_at(gateway, drive_path, LONG));
     TEST_ASSERT_TRUE(reply_has("stopping"));
     end(full);
@@ -238,20 +247,9 @@ static void test_stop_at_without_gateway_returns_immediately(void) {
     TEST_ASSERT_EQUAL(IWC_NOT_THERE, iwc_estop_at(gateway, drive_path, "a\nb", LONG));
 }
 
-/// Writes the replies to all requests with which a client can begin.
-static const char *stopped_for_any_id(void) {
-    static char text[4096];
-    size_t length = 0;
-    for (int id = 2; length + 64U < sizeof text; id += 2) {
-        length += (size_t)snprintf(text + length, sizeof text - length,
-                                   "{\"id\":%d,\"ok\":true,\"state\":\"stopping\"}\n", id);
-    }
-    return text;
-}
-
 /// The name space of this process has an empty /run from here on.
 static void test_stop_at_without_a_name_stops_every_gateway(void) {
-    const char *stopped = stopped_for_any_id();
+    const char *stopped = replies("stopping");
     if (unshare(CLONE_NEWNS) != 0 || mount(NULL, "/", NULL, MS_REC | MS_PRIVATE, NULL) != 0 ||
         mount("none", "/run", "tmpfs", 0, NULL) != 0) {
         TEST_IGNORE_MESSAGE("needs the right to mount");
