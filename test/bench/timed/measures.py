@@ -448,11 +448,17 @@ class Estop(Measure):
             pass  # Sleeping would end too late, and the edge would be reported a whole tick after the level.
         return time.monotonic_ns() // 1000, self.press_now()
 
+    @staticmethod
+    def zeros(bus, can_id, since_us):
+        return [f.t_us for f in bus.frames if f.id == can_id and f.t_us > since_us and not any(f.data[1:3])]
+
     def once(self, bus, settle_s=0.0):
         """Microseconds from the press to the later one of the first zeros after it."""
         level_us, _ = self.press()
         time.sleep(0.03 + settle_s)
-        zeros = [[f.t_us for f in bus.frames if f.id == can_id and f.t_us > level_us and not any(f.data[1:3])] for can_id in (0x10A, 0x12A)]
+        end = time.monotonic() + 1.0
+        while not all(zeros := [self.zeros(bus, can_id, level_us) for can_id in (0x10A, 0x12A)]) and time.monotonic() < end:
+            time.sleep(0.01)
         self.release()
         if not all(zeros):
             raise RuntimeError("no zeros after a press")
