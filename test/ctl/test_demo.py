@@ -16,6 +16,8 @@ import unittest
 
 import pytest
 
+from free_port import free_port
+
 pytestmark = pytest.mark.native("a signal between two system calls")
 ROOT = os.path.abspath(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", ".."))
 BUILD = os.environ["IWHEEL_BUILD"]
@@ -134,11 +136,7 @@ class Others(unittest.TestCase):
     def setUp(self):
         self.folder = tempfile.mkdtemp(prefix="d")
         self.addCleanup(shutil.rmtree, self.folder)
-        with socket.socket() as one, socket.socket() as next_one:
-            one.bind(("127.0.0.1", 0))
-            self.port = one.getsockname()[1]
-            next_one.bind(("127.0.0.1", 0))
-            self.busy_port = next_one.getsockname()[1]
+        self.port, self.busy_port = free_port(), free_port()
 
     def start(self, name, *words):
         process = subprocess.Popen(

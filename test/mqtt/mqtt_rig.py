@@ -18,21 +18,16 @@ try:
 except ImportError:
     paho = None
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "system"))
+sys.path[:0] = [str(Path(__file__).resolve().parent.parent / folder) for folder in ("system", "support")]
 
 from bus import now_us
+from free_port import free_port
 from harness import WORDS, Process, Rig
 from trials import Skip, until
 
 # These limits fit any machine, however busy; the demonstration has the same.
 CONFIG = {"limits": {"wheel_silent_ms": 200, "echo_ms": 200}, "drive": {"lease_ms": 500, "max_speed_mm_s": 500}}
 ID = "w1"
-
-
-def free_port():
-    with socket.socket() as one:
-        one.bind(("127.0.0.1", 0))
-        return one.getsockname()[1]
 
 
 def put_table(page, maker, lines):
@@ -151,7 +146,7 @@ class Line(threading.Thread):
         self.to, self.pairs, self.frozen = port, [], False
         self.listener = socket.create_server(("127.0.0.1", 0))
         self.port = self.listener.getsockname()[1]
-        self.left = None  # Bytes until the line is cut; None: never.
+        self.left, self.counts = None, threading.Lock()  # Bytes until the line is cut; None: never.
         self.delay = 0.0  # Delay of every 4 kB.
         self.start()
 
@@ -186,11 +181,16 @@ class Line(threading.Thread):
         while self.frozen:
             time.sleep(0.01)
         time.sleep(self.delay)
-        if self.left is None:
-            return data, True
-        data = data[: max(0, self.left)]
-        self.left -= len(data)
-        return data, self.left > 0
+        with self.counts:
+            if self.left is None:
+                return data, True
+            data = data[: max(0, self.left)]
+            self.left -= len(data)
+            return data, self.left > 0
+
+    def mend(self):
+        with self.counts:
+            self.left = None
 
     def close(self):
         for one in (self.listener, *self.pairs):
@@ -255,9 +255,10 @@ class MqttRig(Rig):
     def bring_broker_back(self, line, far):
         """Starts the broker so that `far` connects before the bridge: a killed broker has no subscribers, and earlier messages would be lost."""
         line.left = 0
+        far.listens.clear()  # Its thread may not have noticed the end yet.
         self.start_broker()
         assert far.listens.wait(5), "far is back"
-        line.left = None
+        line.mend()
 
     def end_broker(self, number=9):
         self.broker.signal(number)

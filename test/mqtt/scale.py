@@ -41,7 +41,8 @@ sys.path[:0] = [str(HERE), str(HERE.parent / "system")]
 from bus import now_us
 from harness import die_with_parent, find_program
 from judge_log import percentile
-from mqtt_rig import MqttRig, free_port, put_table
+from free_port import free_port
+from mqtt_rig import MqttRig, put_table
 from trials import ROOT, Skip, until
 
 PAGE = ROOT / "docs/user/mqtt.md"

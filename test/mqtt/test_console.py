@@ -19,7 +19,8 @@ from pathlib import Path
 from test_bridge import make_stops, numbers
 from test_fleet import HOSTS, Cluster, use_tls, with_certificate
 from harness import Process
-from mqtt_rig import ID, Far, Line, free_port, paho
+from free_port import free_port
+from mqtt_rig import ID, Far, Line, paho
 from trials import Skip, until
 
 try:

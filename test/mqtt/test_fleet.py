@@ -11,7 +11,8 @@ from pathlib import Path
 
 from test_bridge import make_stops, numbers
 from harness import Process
-from mqtt_rig import ID, Far, free_port
+from free_port import free_port
+from mqtt_rig import ID, Far
 from trials import ROOT, Skip, until
 
 FLEET = ROOT / "share/fleet"

@@ -27,7 +27,8 @@ from harness import Process, wait_connect
 from judge_log import GAP_US
 from shifted_clock import ShiftedClock
 from trials import ROOT, Driver, Skip, braking_ms, longest_gap_ms, until
-from web_rig import Person, free_port
+from free_port import free_port
+from web_rig import Person
 
 ROUTES = ("/api/status", "/api/events", "/api/stops", "/api/recordings", "/api/recording?name=a.log", "/api/fleet", "/metrics", "/health")
 PROVED = ("/api/estop", "/api/arm", "/api/drive", "/api/reset", "/api/record")  # STOP needs no proof.

@@ -33,7 +33,6 @@ def at_standstill(rig):
 
 @pytest.mark.rig(driving=True)
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.exact
 def test_firefox_first_screen_has_state_and_figures(rig, scheme):
     rig.start().connected()
     rig.sim.ask("estop press")

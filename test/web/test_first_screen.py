@@ -351,7 +351,6 @@ def test_languages_have_the_same_texts_with_the_same_gaps(rig):
 
 
 @pytest.mark.rig(driving=True)
-@pytest.mark.exact
 def test_page_in_german_browser_is_german_english_on_request(rig):
     rig.start().connected()
     rig.sim.ask("estop press")

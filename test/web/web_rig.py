@@ -11,20 +11,15 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-sys.path.insert(0, str(ROOT / "test/system"))
+sys.path[:0] = [str(ROOT / "test/system"), str(ROOT / "test/support")]
 
 from bus import now_us
+from free_port import free_port
 from harness import WORDS, Process, Rig
 from trials import until
 
 # For any machine, however busy; as in the demonstration.
 CONFIG = {"limits": {"wheel_silent_ms": 200, "echo_ms": 200}, "drive": {"lease_ms": 500, "max_speed_mm_s": 500}}
-
-
-def free_port():
-    with socket.socket() as one:
-        one.bind(("127.0.0.1", 0))
-        return one.getsockname()[1]
 
 
 class Person:
