@@ -165,8 +165,9 @@ static bool unit_contradicted(const iw_force_t *self) {
     return self->observation == other;
 }
 
-/// Returns true if a wheel whose start was not seen may have measured a person who leaned on it: its offset differs from
-/// the stored one as by a load. (After a good window of an observed start, the offset is no longer IW_OFFSET_STORED.)
+/// Returns true if a wheel whose start was not seen may have measured a person who leaned on it: its offset differs
+/// from the stored one as by a load. (After a good window of an observed start, the offset is no longer
+/// IW_OFFSET_STORED.)
 static bool may_be_load(const iw_force_t *self) {
     return self->provenance == IW_OFFSET_STORED &&
            far_from_offset(self, self->wheel_offset_dN * 100, IW_FORCE_SHIFT_mN);
