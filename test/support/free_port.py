@@ -3,7 +3,7 @@
 
 import socket
 
-HELD = []
+from free_domain import reserve
 
 
 def free_port():
@@ -12,11 +12,5 @@ def free_port():
         with socket.socket() as one:
             one.bind(("127.0.0.1", 0))
             port = one.getsockname()[1]
-        held = socket.socket(socket.AF_UNIX)
-        try:
-            held.bind(f"\0iwheel-test-port-{port}")
-        except OSError:
-            held.close()
-            continue
-        HELD.append(held)  # The name is free again when the process has ended.
-        return port
+        if reserve(f"port-{port}"):
+            return port
