@@ -188,7 +188,7 @@ class Line(threading.Thread):
             self.left -= len(data)
             return data, self.left > 0
 
-    def mend(self):
+    def restore(self):
         with self.counts:
             self.left = None
 
@@ -258,7 +258,7 @@ class MqttRig(Rig):
         far.listens.clear()  # Its thread may not have noticed the end yet.
         self.start_broker()
         assert far.listens.wait(5), "far is back"
-        line.mend()
+        line.restore()
 
     def end_broker(self, number=9):
         self.broker.signal(number)

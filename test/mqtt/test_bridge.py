@@ -454,7 +454,7 @@ def test_network_cut_at_any_byte_each_stop_once_in_order(rig):
     for byte in (60, 150, 900, 2000, 4000):
         line.left = byte
         until(lambda: line.left <= 0, 40, "cut again")
-    line.mend()
+    line.restore()
     until(lambda: numbers(far) == list(range(1, last + 1)), 40, "all six")
     settle(far)
     far.print_figures("connection cut behind a byte, also in the middle of a confirmation", 6)

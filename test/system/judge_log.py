@@ -24,6 +24,7 @@ GAP_US = 100_000  # invariant 4
 PAIR_US = 5_000  # invariant 5: no two cycles are nearer to each other; 0.88 ms on a full bus
 PAIR_REAL_US = PAIR_US + 10_000  # of ordinary programs: the kernel may run another one between two frames of one call (docs/user/pair.md: 6.1 ms)
 ESTOP_US = 5_000  # invariant 2
+STOP_US = 60_000  # a client's stop is obeyed within this, whatever the load of the gateway
 PRESS_US = 2_000  # a press that took longer to make has no known time
 JITTER_US = 10_000  # between the gateway's clock and the bus
 BUS_STALL_US = 5_500  # no telemetry for so long: the simulator waited for the processor
@@ -95,6 +96,7 @@ class Session:
     def __init__(self, begin_us, armed_us):
         self.begin_us, self.armed_us = begin_us, armed_us
         self.drives = []
+        self.refuses_us = 1 << 62  # No drive is accepted from then on.
         self.ends = []  # (t_us, kind, within_us), kind: ramp, cut, press, killed
 
     def end_us(self):
@@ -229,13 +231,15 @@ class Reading:
 
     def _take(self, session, event):
         if event.kind == "drive" and event.ok:
-            if event.t_us > min((at + within for at, _, within in session.ends), default=event.t_us) + ECHO_US:
+            if event.t_us > session.refuses_us + ECHO_US:
                 self._say("drive_after_end", event.t_us, "a drive was accepted although the session had ended")
             session.drives.append(event)
         kinds = {"stop": "ramp", "gone": "ramp", "ramp": "ramp", "press": "press", "estop": "press", "cut": "cut", "end": "killed"}
         if event.kind in kinds:
-            answered_us = event.done_us - event.t_us if event.kind in ("stop", "press", "estop") else 0  # Before, it may not have been made.
-            session.ends.append((event.t_us, kinds[event.kind], max(event.within_us, answered_us)))
+            session.refuses_us = min(session.refuses_us, max(event.t_us + event.within_us, event.done_us))
+            answered_us = max(0, event.done_us - event.t_us)  # Before, it may not have been made: `_estop` limits the latency of others than a stop.
+            obeyed_us = min(answered_us, STOP_US) if event.kind == "stop" else answered_us
+            session.ends.append((event.t_us, kinds[event.kind], max(event.within_us, obeyed_us)))
 
     def _lapse(self, session):
         """The lease ends on its own; a drive after that must have been refused."""

@@ -205,6 +205,10 @@ def faults():
     )
     yield "e-stop ignored until the end", between(f, 3_515, 5_100, with_data(1, 300)), e, "nonzero_after_estop"
     yield "e-stop ignored after a late press", between(f, 3_515, 5_100, with_data(1, 300)), late_press(e), "nonzero_after_estop"
+    waits = add(between(f, 6_701, 8_370, late(300)), *(x for ms in range(6_702, 7_000, 20) for x in pair(ms, 200, 100)))
+    slow = [x._replace(done_us=STOP + 300 * MS) if x.kind == "stop" else x for x in e]
+    slow += [Event(ms * MS, "drive", ms * MS + 400, left=200, right=100) for ms in range(6_700, 7_000, 50)]
+    yield "a stop obeyed and answered after 300 ms", waits, slow, "nonzero_after_ramp"
     yield "an old pair after the e-stop's zeros", add(f, *pair(4_105, 300, 300), *pair(4_110, 300, 300)), e, "nonzero_after_estop"
     yield "no zero at all after the e-stop", between(f, 3_520, 99_999, drop), e, "estop_no_zero"
     yield "motion after release and reset", add(f, *pair(5_450, 100, 100)), e, "sent_after_reset"
