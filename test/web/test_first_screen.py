@@ -106,26 +106,26 @@ def test_large_figures_are_those_of_the_snapshot(rig):
 
 
 @pytest.mark.rig(driving=True)
-def test_stop_is_usable_above_dialogs_zoomed_and_in_large_text(rig):
+@pytest.mark.parametrize("size", VIEWS)
+def test_stop_is_usable_above_dialogs_zoomed_and_in_large_text(rig, size):
     rig.start().connected()
-    for size in VIEWS:
-        with page_of(rig, size, **touch(size)) as page:
-            live(page)
-            for zoom, text in ((1, 100), (3.3, 100), (1, 200)):
-                page.evaluate(f"document.documentElement.style.fontSize = '{text}%'")
-                for button in ("#estop-ask", "#arm"):
-                    page.evaluate(f"document.querySelector('{button}').click()")
-                    page.context.new_cdp_session(page).send("Emulation.setPageScaleFactor", {"pageScaleFactor": zoom})
-                    time.sleep(0.3)
-                    shot(page, f"stop-{size}-{zoom}-{text}-{button[1:]}")
-                    assert page.evaluate("document.querySelector('#ask').open")
-                    press_stop(page, rig)
-                    assert not page.evaluate("document.querySelector('#ask').open"), "STOP closes the question with no"
-                box = page.evaluate(
-                    "(() => { const r = document.querySelector('#stop').getBoundingClientRect(), v = visualViewport; return [r.width / v.width, r.height * v.scale]; })()"
-                )
-                assert box[1] >= 44 or zoom > 1, (size, zoom, text, box)
-                page.context.new_cdp_session(page).send("Emulation.setPageScaleFactor", {"pageScaleFactor": 1})
+    with page_of(rig, size, **touch(size)) as page:
+        live(page)
+        for zoom, text in ((1, 100), (3.3, 100), (1, 200)):
+            page.evaluate(f"document.documentElement.style.fontSize = '{text}%'")
+            for button in ("#estop-ask", "#arm"):
+                page.evaluate(f"document.querySelector('{button}').click()")
+                page.context.new_cdp_session(page).send("Emulation.setPageScaleFactor", {"pageScaleFactor": zoom})
+                time.sleep(0.3)
+                shot(page, f"stop-{size}-{zoom}-{text}-{button[1:]}")
+                assert page.evaluate("document.querySelector('#ask').open")
+                press_stop(page, rig)
+                assert not page.evaluate("document.querySelector('#ask').open"), "STOP closes the question with no"
+            box = page.evaluate(
+                "(() => { const r = document.querySelector('#stop').getBoundingClientRect(), v = visualViewport; return [r.width / v.width, r.height * v.scale]; })()"
+            )
+            assert box[1] >= 44 or zoom > 1, (size, zoom, text, box)
+            page.context.new_cdp_session(page).send("Emulation.setPageScaleFactor", {"pageScaleFactor": 1})
 
 
 @pytest.mark.rig(driving=True)
