@@ -57,7 +57,7 @@ class Campaign:
             for entry in ENTRIES.values()
             if group.runs(entry.name, entry.groups, options.full) and (not options.only or any(part in entry.name for part in options.only))
         ]
-        if not names or (options.real_time and group.virtual) or (group.full_only and not options.full):
+        if not names or (options.part and group.part not in options.part) or (group.full_only and not options.full):
             return None
         if group.name == "soak" and options.hours == 0:
             return None
@@ -208,7 +208,8 @@ def parse(arguments):
     root = os.path.dirname(os.path.dirname(HERE))
     parser.add_argument("--build", default=os.path.join(root, "build", "default"), metavar="DIR", help="build directory (default: build/default)")
     parser.add_argument("--only", action="append", metavar="NAME", help="only tests whose name contains NAME; may be repeated")
-    parser.add_argument("--real-time", action="store_true", help="only the groups in real time")
+    parts = "only the groups in virtual time, in real time, or the long ones: the soak and the distribution's kernels; may be repeated"
+    parser.add_argument("--part", action="append", choices=("virtual", "real", "long"), help=parts)
     parser.add_argument("--native", action="store_true", help="run on the machine's own kernel, with its vcan and gpio-sim, in real time")
     parser.add_argument("--full", action="store_true", help=f"all tests: 1000 presses of the e-stop, a soak of {HOURS_FULL} virtual hours")
     parser.add_argument("--repeat", type=int, default=1, metavar="N", help="N campaigns in a row, each with the next seed")

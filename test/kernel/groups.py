@@ -19,7 +19,13 @@ class Group(NamedTuple):
     same_as: str = ""
     few: tuple = ()
     gpiod: int = 0  # the major version of libgpiod; 0: that of --build
+    long: bool = False  # of the part `long`, without being of a distribution
     distribution: str = ""  # a machine of distribution.py, on the distribution's kernel: no load makes its clock late, but its processor is not infinitely fast
+
+    @property
+    def part(self):
+        """virtual, real (time), or long: hours, or a distribution's kernel under emulation."""
+        return "long" if self.long or self.distribution else "virtual" if self.virtual else "real"
 
     def runs(self, name, groups, full):
         """Whether a test of that name and those groups belongs to this group."""
@@ -41,7 +47,7 @@ READS_THE_LINE = (
 SHORT = ("controller_nominal", "controller_row15", "controller_row25_killed")
 # The longest come first, so that no processor waits for one of them at the end.
 GROUPS = (
-    Group("soak", "an hour of random faults, with --full a day", limit_s=3600, full_limit_s=24 * 3600),
+    Group("soak", "an hour of random faults, with --full a day", limit_s=3600, full_limit_s=24 * 3600, long=True),
     Group("realtime", "the same rules in real time", virtual=False),
     Group("starved", "a processor shared with other programs", virtual=False),
     Group("realtime-full", "more of them", virtual=False, full_only=True, full_limit_s=3 * 3600),
