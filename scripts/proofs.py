@@ -4,9 +4,9 @@
 
 usage: scripts/proofs.py [--update] [TABLE]
 
-A row is a step of ./check (the tests STEP and STEP.* of test/all/steps.cmake), or one of several proofs in a step. `number` is a minimum of single
-tests. Failures: a step without a row, a row whose step or runner does not exist any more or has moved to a longer list, and a number that has become
-smaller. Numbers come from the runners' lists, from the sources, and from the last run of the step (build/check/STEP*.counts). A step that did not
+A row is a step of ./check (the tests STEP and STEP.* of test/all/steps.cmake), a test STEP.NAME that is in a longer list, or one of several proofs
+in a step. `number` is a minimum of single tests. Failures: a step without a row, a row whose step or runner does not exist any more or has moved to a
+longer list, and a number that has become smaller. Numbers come from the runners' lists, from the sources, and from the last run of the step (build/check/STEP*.counts). A step that did not
 run is "not run", which is no pass. --update raises numbers and adds steps. No tool does it: CTest and pytest compare no list with an earlier one.
 """
 
@@ -56,11 +56,16 @@ def tests():
     return [(re.sub(r"\$\{\w+\}", "*", name), where) for name, where in found]
 
 
-def steps():
-    """Returns {step: the shortest list that has all tests of the step: quick, check, ci; full only if all of them are in it}."""
+def row_of(test, table):
+    """Returns the id of the row that a test belongs to."""
+    return test if test in table and test not in COUNTED and test not in LISTED else test.split(".")[0]
+
+
+def steps(table):
+    """Returns {row: the shortest list that has all tests of the row: quick, check, ci; full only if all of them are in it}."""
     found = {}
     for name, where in tests():
-        step = name.split(".")[0]
+        step = row_of(name, table)
         found[step] = max(found.get(step, "quick"), where, key=LISTS.index) if where != "full" or step not in found else found[step]
     return found
 
@@ -76,20 +81,20 @@ def listed(command):
     return sum("::" in line or "pytest" not in command for line in done.stdout.splitlines()) if done.returncode == 0 else None
 
 
-def last_run(step):
-    """Returns the number of single tests in the last run of the step; None if a test of it did not run, or skipped some."""
-    paths = [list(ROOT.glob(f"build/check/{name}.counts")) for name, where in tests() if name.split(".")[0] == step and where != "full"]
+def last_run(row, table):
+    """Returns the number of single tests in the last run of the row; None if a test of it did not run, or skipped some."""
+    paths = [list(ROOT.glob(f"build/check/{name}.counts")) for name, where in tests() if row_of(name, table) == row and where != "full"]
     counts = [list(map(int, path.read_text().split())) for of_test in paths for path in of_test]
     return sum(map(sum, counts)) if paths and all(paths) and not any(sum(one[2:]) for one in counts) else None
 
 
-def number_of(name):
+def number_of(name, table):
     if name in LISTED:
         return listed(LISTED[name][1])
     if name in COUNTED:
         _, files, begins = COUNTED[name]
         return sum(len(re.findall(begins, path.read_text(), re.M)) for path in ROOT.glob(files))
-    return last_run(name)
+    return last_run(name, table)
 
 
 def rows_now(known, table):
@@ -105,13 +110,14 @@ def main(arguments):
     if "--help" in arguments:
         print(__doc__)
         return 0
-    known, path = steps(), Path(next((word for word in arguments if not word.startswith("--")), TABLE))
+    path = Path(next((word for word in arguments if not word.startswith("--")), TABLE))
     with open(path, newline="", encoding="utf-8") as file:
         table = {row["id"]: row for row in csv.DictReader(file)}
+    known = steps(table)
     wrong = []
     for name, what, command, where in rows_now(known, table):
         if "--update" in arguments:
-            now = number_of(name)
+            now = number_of(name, table)
             old = int(table.get(name, {}).get("number") or 0)
             table[name] = dict(zip(FIELDS, (name, what, command, max(old, now or 0) or "", where), strict=False))
         elif name not in table:
@@ -119,10 +125,10 @@ def main(arguments):
         elif table[name]["list"] != where:
             wrong.append(f"{name}: in list {where}, {table[name]['list']} recorded; a proof does not change its list without a reason")
     for name, row in table.items():
-        if name.split(".")[0] not in known or ("." in name and name not in LISTED and name not in COUNTED):
+        if name not in known and ((name not in LISTED and name not in COUNTED) or name.split(".")[0] not in known):
             wrong.append(f"{name}: no longer in list {row['list']}; restore the proof, or move its row with a reason")
             continue
-        now = number_of(name)
+        now = number_of(name, table)
         if row["number"] and now is not None and now < int(row["number"]):
             wrong.append(f"{name}: {now} single tests, {row['number']} recorded; restore the missing ones")
         if now is None:
