@@ -163,6 +163,14 @@ TEST(test_marker_is_found_by_a_gateway_with_other_socket) {
     TEST_ASSERT_FALSE(gw_runtime_crashed(&first));
 }
 
+TEST(test_marker_makes_the_shared_directory_again_that_was_removed) {
+    TEST_ASSERT_EQUAL_INT(0, open_runtime(&first, &one));
+    TEST_ASSERT_EQUAL_INT(0, rename(shared, under("removed")));
+    TEST_ASSERT_TRUE(gw_runtime_mark(&first, true));
+    TEST_ASSERT_TRUE(exists(first.place[0]));
+    TEST_ASSERT_EQUAL_STRING(first.place[0], first.marker_path);
+}
+
 TEST(test_marker_without_shared_directory_is_next_to_the_socket) {
     FILE *in_the_way = fopen(shared, "w"); // This also prevents root.
     TEST_ASSERT_NOT_NULL(in_the_way);
