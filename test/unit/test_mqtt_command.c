@@ -67,11 +67,11 @@ TEST(test_command_age_is_judged_to_the_microsecond) {
 }
 
 /// Judges a command with properties of MQTT 5.
-static mqtt_verdict_t judge_labelled(int seq, const char *answer_to, size_t correlation_length) {
+static mqtt_verdict_t judge_labelled(const char *verb, int seq, const char *answer_to, size_t correlation_length) {
     static const char correlation[MQTT_CORRELATION_MAX + 1U] = "c\0d";
     char text[128];
     (void)snprintf(text, sizeof text, "{\"from\":\"far\",\"boot\":\"" BOOT "\",\"t_us\":%u,\"seq\":%d}", NOW_US, seq);
-    const mqtt_command_t command = {.verb = "stop",
+    const mqtt_command_t command = {.verb = verb,
                                     .payload = text,
                                     .length = strlen(text),
                                     .answer_to = answer_to,
@@ -82,31 +82,33 @@ static mqtt_verdict_t judge_labelled(int seq, const char *answer_to, size_t corr
 }
 
 TEST(test_command_response_topic_must_be_a_reply_of_this_machine) {
-    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_labelled(1, NULL, 0));
+    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_labelled("why", 1, NULL, 0));
     TEST_ASSERT_EQUAL_STRING("far", order.to);
-    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_labelled(2, "iwheel/w1/reply/other", 0));
+    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_labelled("why", 2, "iwheel/w1/reply/other", 0));
     TEST_ASSERT_EQUAL_STRING("other", order.to);
     static const char *const wrong[] = {"iwheel/w1/event/stop", "iwheel/w2/reply/far", "iwheel/w1/reply/",
                                         "iwheel/w1/reply/a/b",  "iwheel/w1/reply/#",   ""};
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
-        TEST_ASSERT_EQUAL_MESSAGE(MQTT_GARBLED, judge_labelled(3, wrong[i], 0), wrong[i]);
+        TEST_ASSERT_EQUAL_MESSAGE(MQTT_GARBLED, judge_labelled("why", 3, wrong[i], 0), wrong[i]);
         TEST_ASSERT_EQUAL_STRING("far", order.to);
         TEST_ASSERT_EQUAL_STRING("", order.request);
     }
 }
 
 TEST(test_command_correlation_data_is_stored_up_to_its_limit) {
-    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_labelled(1, NULL, 3));
+    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_labelled("why", 1, NULL, 3));
     TEST_ASSERT_EQUAL_UINT16(3, order.correlation_length);
     TEST_ASSERT_EQUAL_MEMORY("c\0d", order.correlation, 3);
-    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_labelled(2, NULL, MQTT_CORRELATION_MAX));
-    TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_labelled(3, NULL, MQTT_CORRELATION_MAX + 1U));
+    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_labelled("why", 2, NULL, MQTT_CORRELATION_MAX));
+    TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_labelled("why", 3, NULL, MQTT_CORRELATION_MAX + 1U));
 }
 
 TEST(test_command_ttl_cannot_extend_its_age_limit) {
     TEST_ASSERT_EQUAL(MQTT_LATE, judge_it("drive", NOW_US, 1, ",\"ttl_ms\":1000", NOW_US + 300001U));
-    TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_it("stop", NOW_US, 2, ",\"ttl_ms\":1001", NOW_US));
-    TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_it("stop", NOW_US, 3, ",\"ttl_ms\":0", NOW_US));
+    TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_it("why", NOW_US, 2, ",\"ttl_ms\":1001", NOW_US));
+    TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_it("why", NOW_US, 3, ",\"ttl_ms\":0", NOW_US));
+    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("stop", NOW_US, 4, ",\"ttl_ms\":0", NOW_US + 1000000U));
+    TEST_ASSERT_EQUAL(MQTT_LATE, judge_it("stop", NOW_US, 5, ",\"ttl_ms\":1001", NOW_US + 1000001U));
 }
 
 TEST(test_command_of_another_boot_is_dropped_before_its_age) {
@@ -225,7 +227,7 @@ TEST(test_command_garbled_is_dropped) {
         "{\"from\":\"far\",\"seq\":1,\"boot\":\"" BOOT "\",\"t_us\":-1}",
     };
     for (size_t i = 0; i < sizeof texts / sizeof texts[0]; i++) {
-        TEST_ASSERT_EQUAL_MESSAGE(MQTT_GARBLED, judge_text("stop", texts[i], NOW_US), texts[i]);
+        TEST_ASSERT_EQUAL_MESSAGE(MQTT_GARBLED, judge_text("why", texts[i], NOW_US), texts[i]);
     }
     TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_it("takeover", NOW_US, 1, "", NOW_US));
     TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_it("drive", NOW_US, 1, ",\"left_mm_s\":{\"cmd\":\"arm\"}", NOW_US));
@@ -242,6 +244,24 @@ static void expect_estop(const char *request, const char *value) {
                    "{\"from\":\"far\",\"boot\":\"" BOOT "\",\"t_us\":50000000,\"seq\":1,\"reason\":%s}", value);
     TEST_ASSERT_EQUAL_MESSAGE(MQTT_TAKEN, judge_text("estop", text, NOW_US), value);
     TEST_ASSERT_EQUAL_STRING(request, order.request);
+}
+
+/// The time alone decides: who sent it, its number, its limit and where its answer goes do not.
+TEST(test_stop_never_needs_a_sender_a_number_or_a_destination) {
+    static const char *const texts[] = {
+        "{\"boot\":\"" BOOT "\",\"t_us\":50000000}",
+        "{\"boot\":\"" BOOT "\",\"t_us\":50000000,\"from\":\"a/b\",\"seq\":\"1\"}",
+        "{\"boot\":\"" BOOT "\",\"t_us\":50000000,\"from\":7,\"seq\":1.0,\"ttl_ms\":\"\"}",
+    };
+    for (size_t i = 0; i < sizeof texts / sizeof texts[0]; i++) {
+        TEST_ASSERT_EQUAL_MESSAGE(MQTT_TAKEN, judge_text("stop", texts[i], NOW_US), texts[i]);
+        TEST_ASSERT_EQUAL_STRING("{\"cmd\":\"stop\"}", order.request);
+        TEST_ASSERT_EQUAL_STRING("", order.to);
+        TEST_ASSERT_EQUAL_MESSAGE(MQTT_TAKEN, judge_text("estop", texts[i], NOW_US), texts[i]);
+    }
+    TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_text("stop", "{\"boot\":\"" BOOT "\",\"t_us\":\"1\"}", NOW_US));
+    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_labelled("stop", 1, "elsewhere", MQTT_CORRELATION_MAX + 1U));
+    TEST_ASSERT_EQUAL_STRING("far", order.to);
 }
 
 TEST(test_stop_never_refused_by_mqtt_for_a_field_or_its_reason) {

@@ -197,14 +197,14 @@ static size_t place_of(const mqtt_judge_t *self, const char *from, uint64_t now_
     return free ? oldest : MQTT_SENDERS;
 }
 
-/// Returns the largest age in ms after the quoted time; 0 if `ttl_ms` is not valid.
+/// Returns the largest age in ms after the quoted time; 0 if `ttl_ms` is not valid, except in a stop.
 static int64_t ttl_of(const mqtt_rules_t *rules, iwn_json_t root, mqtt_verb_t verb) {
     const int64_t most_ms = forms[verb].permits ? (int64_t)rules->ttl_ms : (int64_t)MQTT_TTL_MAX_MS;
     int64_t asked_ms = most_ms;
     iwn_json_t value;
     if (iwn_json_find(root, "ttl_ms", &value) &&
         (!number_of(root, "ttl_ms", &asked_ms) || asked_ms < 1 || asked_ms > (int64_t)MQTT_TTL_MAX_MS)) {
-        return 0;
+        return is_stop(verb) ? most_ms : 0;
     }
     return (asked_ms < most_ms) ? asked_ms : most_ms;
 }
@@ -260,45 +260,51 @@ static bool find_verb(const char *word, mqtt_verb_t *out_verb) {
     return false;
 }
 
-/// Reads the destination and the correlation data of the answer: from the MQTT 5 properties, otherwise `from`.
-static bool read_labels(const mqtt_rules_t *rules, const mqtt_command_t *command, mqtt_order_t *order) {
+/// Reads the destination and the correlation data of the answer: from the MQTT 5 properties, otherwise `from`. Returns
+/// NULL, or what is wrong with them.
+static const char *read_labels(const mqtt_rules_t *rules, const mqtt_command_t *command, mqtt_order_t *order) {
     const size_t begin = (rules->replies != NULL) ? strlen(rules->replies) : 0U;
     memcpy(order->to, order->from, sizeof order->to);
     if (command->answer_to != NULL) {
         if (begin == 0U || strncmp(command->answer_to, rules->replies, begin) != 0 ||
             !mqtt_settings_is_name(command->answer_to + begin)) {
-            return drop(order, MQTT_GARBLED, "a response topic must be iwheel/ID/reply/NAME of this machine");
+            return "a response topic must be iwheel/ID/reply/NAME of this machine";
         }
         (void)snprintf(order->to, sizeof order->to, "%s", command->answer_to + begin);
     }
     if (command->correlation_length > sizeof order->correlation) {
-        return drop(order, MQTT_GARBLED, "correlation data has 64 bytes at most");
+        return "correlation data has 64 bytes at most";
     }
     if (command->correlation_length > 0U) {
         memcpy(order->correlation, command->correlation, command->correlation_length);
         order->correlation_length = (uint16_t)command->correlation_length;
     }
-    return true;
+    return NULL;
 }
 
-/// Parses the sender, the verb and the JSON object.
+/// Parses the sender, the verb and the JSON object. A stop needs neither `from` nor `seq`.
 static bool read_command(mqtt_judge_t *self, const mqtt_command_t *command, iwn_json_t *out_root, mqtt_order_t *order) {
     char fault[80];
     iwn_text_t words = iwn_text_begin(fault, sizeof fault);
     const bool known = find_verb(command->verb, &order->verb);
     const size_t most = is_stop(order->verb) ? IWN_JSON_MAX : MQTT_COMMAND_MAX; // The reason may be long.
     if (command->length > most || !iwn_json_check(command->payload, command->length, &self->work, out_root, &words) ||
-        iwn_json_kind(*out_root) != IWN_JSON_OBJECT || !text_of(*out_root, "from", order->from, sizeof order->from) ||
-        !mqtt_settings_is_name(order->from)) {
+        iwn_json_kind(*out_root) != IWN_JSON_OBJECT) {
+        return drop(order, MQTT_GARBLED, "not a JSON object");
+    }
+    if (!text_of(*out_root, "from", order->from, sizeof order->from) || !mqtt_settings_is_name(order->from)) {
         order->from[0] = '\0';
-        return drop(order, MQTT_GARBLED, "not a JSON object with a name in from");
+        if (!is_stop(order->verb)) {
+            return drop(order, MQTT_GARBLED, "from must be a name");
+        }
     }
     if (!known) {
         return drop(order, MQTT_GARBLED, "there is no such command");
     }
     if (!number_of(*out_root, "seq", &order->seq) || order->seq < 1) {
         order->seq = 0;
-        return drop(order, MQTT_GARBLED, "the command needs seq, a number from 1 on that increases with each command");
+        return is_stop(order->verb) ||
+               drop(order, MQTT_GARBLED, "the command needs seq, a number from 1 on that increases with each command");
     }
     return true;
 }
@@ -314,8 +320,9 @@ static bool judge_command(mqtt_judge_t *self, const mqtt_rules_t *rules, const m
         memcpy(order->to, order->from, sizeof order->to);
         return false;
     }
-    if (!read_labels(rules, command, order)) {
-        return false;
+    const char *problem = read_labels(rules, command, order);
+    if (problem != NULL && !is_stop(order->verb)) {
+        return drop(order, MQTT_GARBLED, problem);
     }
     if (!write_request(root, order)) {
         return drop(order, MQTT_GARBLED, "it has a field that this command does not have, or an invalid value");
