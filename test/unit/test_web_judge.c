@@ -134,7 +134,7 @@ TEST(test_stop_never_needs_a_proof) {
 TEST(test_header_sent_twice_is_refused) {
     asked.is_doubled = true;
     TEST_ASSERT_EQUAL_UINT(400, status());
-    asked.has_body = true;
+    asked.body = 1;
     TEST_ASSERT_EQUAL_UINT(400, status());
 }
 
@@ -149,7 +149,30 @@ TEST(test_request_to_unknown_path_or_method_is_refused) {
     TEST_ASSERT_EQUAL_UINT(405, status());
     asked.method = "POST";
     TEST_ASSERT_EQUAL_UINT(200, status());
-    asked.has_body = true;
+}
+
+TEST(test_request_with_a_body_is_refused) {
+    asked.body = 1;
+    TEST_ASSERT_EQUAL_UINT(413, status());
+    asked.body = -1;
+    TEST_ASSERT_EQUAL_UINT(413, status());
+    asked.method = "POST";
+    TEST_ASSERT_EQUAL_UINT(413, status());
+    asked.path = "/api/stop";
+    TEST_ASSERT_EQUAL_UINT(413, status());
+    asked.body = 4097;
+    TEST_ASSERT_EQUAL_UINT(413, status());
+}
+
+TEST(test_stop_is_never_refused_for_a_short_body) {
+    asked.method = "POST";
+    asked.path = "/api/stop";
+    asked.body = 2;
+    TEST_ASSERT_EQUAL_UINT(200, status());
+    asked.path = "/api/estop";
+    asked.body = 4096;
+    TEST_ASSERT_EQUAL_UINT(200, status());
+    asked.path = "/api/record";
     TEST_ASSERT_EQUAL_UINT(413, status());
 }
 

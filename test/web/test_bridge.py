@@ -259,6 +259,15 @@ def test_request_with_a_body_is_refused_at_once(rig):
     assert b" 413 " in raw(rig, head + b"Transfer-Encoding: chunked\r\n\r\n5\r\nhello\r\n0\r\n\r\n")
 
 
+def test_stop_with_a_short_body_stops(rig):
+    """Many programs send one with each POST."""
+    rig.start().connected()
+    driver = Driver(rig)
+    answer = raw(rig, b"POST /api/stop HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 2\r\n\r\n{}")
+    assert b" 200 " in answer and b'"state":"stopping"' in answer, answer
+    driver.end()
+
+
 def test_header_that_counts_is_there_once(rig):
     """A proxy may read the last one, the library reads the first."""
     rig.start().connected()

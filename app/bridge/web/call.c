@@ -252,9 +252,12 @@ static enum MHD_Result carry_out(web_call_t *self) {
     }
 }
 
-static bool has_body(struct MHD_Connection *connection) {
+/// Returns the bytes of the body; -1: any number.
+static int64_t body_of(struct MHD_Connection *connection) {
     const char *length = header(connection, "Content-Length");
-    return header(connection, "Transfer-Encoding") != NULL || (length != NULL && strcmp(length, "0") != 0);
+    int64_t bytes = 0;
+    const bool known = length == NULL || web_number(length, 0, INT64_MAX, &bytes);
+    return (known && header(connection, "Transfer-Encoding") == NULL) ? bytes : -1;
 }
 
 /// Counts headers that may occur only once: some programs read the first one, others the last one.
@@ -299,7 +302,7 @@ static void begin(web_call_t *self, const char *url, const char *method) {
         header(self->connection, "Origin"),
         header(self->connection, "Sec-Fetch-Site"),
         web_proofs_judge(&server->proofs, server->token.text, &claim, server->now_us, &self->session),
-        has_body(self->connection),
+        body_of(self->connection),
         is_doubled(self->connection)};
     self->verdict = web_judge(&rules, &asked);
     self->state = WEB_CALL_JUDGED;

@@ -8,6 +8,9 @@
 #include <string.h>
 #include <strings.h>
 
+/// Bytes of a body that a stop may have.
+#define STOP_BODY_MAX 4096
+
 #define JSON "application/json"
 #define TEXT "text/plain; charset=utf-8"
 #define JS   "text/javascript; charset=utf-8"
@@ -169,6 +172,12 @@ static web_verdict_t refuse(unsigned status, const char *error, const char *mess
     return (web_verdict_t){status, error, message, NULL};
 }
 
+/// Many programs send `{}` with each POST: a short body does not prevent a stop. Nothing reads it.
+static bool may_have_body(const web_route_t *route, int64_t body) {
+    const bool stops = route != NULL && (route->verb == WEB_STOP || route->verb == WEB_ESTOP);
+    return body == 0 || (stops && body > 0 && body <= STOP_BODY_MAX);
+}
+
 /// A link from another site to the page is allowed, like any link; it reveals nothing.
 static bool is_navigation(const web_route_t *route, const web_asked_t *asked) {
     return route != NULL && strcmp(route->path, "/") == 0 && asked->origin == NULL;
@@ -190,7 +199,7 @@ web_verdict_t web_judge(const web_rules_t *rules, const web_asked_t *asked) {
                       "Host, Content-Length, Transfer-Encoding or Authorization is sent twice, or a name has a blank; "
                       "send each once");
     }
-    if (asked->has_body) {
+    if (!may_have_body(route, asked->body)) {
         return refuse(413, "no_body", "requests have no body here: the address has all fields");
     }
     if (!has_proof(route, asked)) {

@@ -51,7 +51,7 @@ typedef struct {
     const char *origin;
     const char *site; ///< Sec-Fetch-Site
     web_proof_t proof;
-    bool has_body;
+    int64_t body;    ///< Bytes; -1: any number.
     bool is_doubled; ///< A header that must be unique is sent twice, or the name of a header has a blank.
 } web_asked_t;
 
