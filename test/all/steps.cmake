@@ -116,7 +116,8 @@ test(waits mqtt check+full realtime default "${B}/app/bridge/mqtt/iwheel-mqtt py
 test(idle serial check+full scenario "default;kernel.build" py:pytest 60 ${PYTEST} test/serial/test_wires.py --build ${B} --virtual --jobs ${JOBS})
 test(real serial.realtime check+full realtime default py:pytest 10 ${PYTEST} test/serial/test_wires.py --build ${B} --jobs 4 -m native)
 test(waits serial.image check+full target default "py:pytest py:unicorn arm-none-eabi-gcc" 40 ${PYTEST} test/serial/test_image.py --build ${B})
-test(waits web check+full realtime default "${B}/app/bridge/web/iwheel-web py:pytest" 160 ${PYTEST} test/web --build ${B} --jobs 4)
+test(waits web check+full realtime default "${B}/app/bridge/web/iwheel-web py:pytest" 80 ${PYTEST} test/web/test_bridge.py --build ${B})
+test(waits web.browser ci+full realtime default "${B}/app/bridge/web/iwheel-web py:pytest" 120 ${PYTEST} test/web --build ${B} --jobs 4 --ignore-glob=*/test_bridge.py)
 test(idle cross.packages ci packaging default "" 78 test/cross/run --build)
 test(waits cross ci packaging "default;cross.packages" "" 40 test/cross/run)
 foreach(tests distribution native repeated verdicts)
@@ -148,7 +149,7 @@ test(waits python.realtime check realtime default py:pytest 25 ${PYTEST} python/
 set(files test/ctl/test_recordings.py test/ctl/test_learn_table.py) # They only compute.
 # The tests of bringup wait twelve minutes: virtual time costs six times the processor time that they use in real time.
 test(idle ctl check scenario "default;kernel.build" py:pytest 60 ${PYTEST} test/ctl --build ${B} --virtual --jobs ${JOBS} --ignore-glob=*/test_recordings.py --ignore-glob=*/test_learn_table.py --ignore-glob=*/test_bringup.py)
-test(waits ctl.bringup check realtime default py:pytest 125 ${PYTEST} test/ctl/test_bringup.py --build ${B} --jobs 8)
+test(waits ctl.bringup ci realtime default py:pytest 125 ${PYTEST} test/ctl/test_bringup.py --build ${B} --jobs 8)
 test(idle ctl.files check unit default py:pytest 6 ${PYTEST} ${files} --build ${B} --jobs ${JOBS})
 test(waits ctl.realtime check realtime default py:pytest 36 ${PYTEST} test/ctl --build ${B} --jobs 4 -m native)
 test(waits captures check realtime default "" 22 python3 test/ctl/captures --build ${B} --check)
