@@ -6,8 +6,9 @@ usage: scripts/proofs.py [--update] [TABLE]
 
 A row is a step of ./check (the tests STEP and STEP.* of test/all/steps.cmake), a test STEP.NAME that is in a longer list, or one of several proofs
 in a step. `number` is a minimum of single tests. Failures: a step without a row, a row whose step or runner does not exist any more or has moved to a
-longer list, and a number that has become smaller. Numbers come from the runners' lists, from the sources, and from the last run of the step (build/check/STEP*.counts). A step that did not
-run is "not run", which is no pass. --update raises numbers and adds steps. No tool does it: CTest and pytest compare no list with an earlier one.
+longer list, and a number that has become smaller. Numbers come from the runners' lists, from the sources, and from the last run of the step
+(build/check/STEP*.counts). A step that did not run is "not run", which is no pass. --update raises numbers and adds steps. No tool does it: CTest and
+pytest compare no list with an earlier one.
 """
 
 import csv
