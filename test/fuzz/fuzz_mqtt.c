@@ -83,8 +83,8 @@ static void judge_command(const mqtt_rules_t *rules, const mqtt_command_t *comma
         fuzz_require(order.why[0] != '\0', "and why");
         return;
     }
-    fuzz_require(order.from[0] != '\0' && strpbrk(order.from, "/+#\" ") == NULL, "a name");
-    fuzz_require(order.to[0] != '\0' && strpbrk(order.to, "/+#\" ") == NULL, "and the receiver of the reply");
+    fuzz_require(is_stop(order.verb) || (order.from[0] != '\0' && order.to[0] != '\0'), "a sender, and a receiver");
+    fuzz_require(strpbrk(order.from, "/+#\" ") == NULL && strpbrk(order.to, "/+#\" ") == NULL, "names");
     fuzz_require(strchr(order.request, '\n') == NULL && strncmp(order.request, "{\"cmd\":\"", 8) == 0, "one line");
     fuzz_require(strncmp(order.request + 8, command->verb, strlen(command->verb)) == 0, "of that verb");
     fuzz_require(order.verb != MQTT_RESET || rules->may_reset, "not configured");
