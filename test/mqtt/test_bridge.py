@@ -220,7 +220,7 @@ def test_command_late_early_or_of_another_boot_stops_nothing(rig):
         assert far.ask(verb, quote={**far.quote(), "boot": "0" * 16})["error"] == "other_boot"
         quote = far.quote()
         assert far.ask(verb, quote={**quote, "t_us": quote["t_us"] + 60_000_000})["error"] == "early"
-        assert far.ask(verb, quote=far.quote(), ttl_ms=2000)["error"] == "garbled"
+        assert far.ask(verb, quote={**quote, "t_us": str(quote["t_us"])})["error"] == "garbled"
     assert rig.gateway_state()["state"] == "armed"
     until(lambda: all(counts(far)[word] == 2 for word in ("late", "other_boot", "early", "garbled")), what="counted")
     driver.end()
@@ -285,8 +285,13 @@ def test_garbage_is_dropped_counted_and_changes_nothing(rig):
     until(lambda: counts(far)["garbled"] == dropped, what=f"{dropped} counted: {counts(far)}")
     assert rig.gateway_state()["state"] == "listening" and rig.client(name="a").request("why")["number"] == 0
     assert far.ask("why")["ok"]
-    far.client.publish(f"iwheel/{ID}/cmd/estop", json.dumps({**quote, "from": "a/b", "ttl_ms": 0, "reason": ['x\n{"cmd":"reset"}'], "speed": 1}), qos=1)
-    until(lambda: rig.gateway_state()["state"] == "latched", what="latched")
+
+    def latches():
+        strange = {**far.quote(), "from": "a/b", "ttl_ms": 0, "reason": ['x\n{"cmd":"reset"}'], "speed": 1}
+        far.client.publish(f"iwheel/{ID}/cmd/estop", json.dumps(strange), qos=1)
+        return rig.gateway_state()["state"] == "latched"
+
+    until(latches, what="latched")
 
 
 def test_bridge_that_watches_neither_arms_drives_nor_resets(rig):
