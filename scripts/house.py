@@ -10,7 +10,8 @@ layers   permitted includes: every include from one library or program into anot
          of a source or header file belongs to one file of core, lib, port and app.
 pages    the indexes of test/, scripts/ and docs/; links of Markdown, and names of pages in every file: each must exist; and the lists of
          docs/developer/how-to-add.md. A list follows a comment `<!-- pattern: REGEX  in: PLACE... -->`: it must contain exactly the files in those places
-         that have the pattern, each after its number. The list may also contain files of test/ that have the pattern.
+         that have the pattern, each after its number. The list may also contain files of test/ that have the pattern. And a version in CHANGELOG.md
+         has at most CHANGES lines.
 pins     the lists of requirements/: every package that pyproject.toml requires is pinned for each Python and machine, with checksums, and no program
          of the tree calls pip without checksums.
 
@@ -229,6 +230,7 @@ def layers():
 # ---- pages ----------------------------------------------------------------------------------------------------------
 
 PAGE = "docs/developer/how-to-add.md"
+CHANGES = 80
 MARK = re.compile(r"<!-- pattern: (.+?)  in: (.+?) -->\n")
 
 
@@ -307,8 +309,16 @@ def judge_names():
     return [line.replace(f"{ROOT}/", "") for line in wrong], count
 
 
+def judge_changelog():
+    versions = re.findall(r"^## (.+)\n((?:(?!^## ).*\n)*)", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), re.MULTILINE)
+    lengths = {version: sum(bool(line.strip()) for line in text.splitlines()) + 1 for version, text in versions}
+    wrong = [f"CHANGELOG.md: {version} has {lines} lines: shorten it to {CHANGES}" for version, lines in lengths.items() if lines > CHANGES]
+    return wrong if lengths else ["CHANGELOG.md: it has no version"]
+
+
 def pages():
     findings, lists = judge_how_to_add()
+    findings += judge_changelog()
     more, names = judge_names()
     findings += more
     print(f"{names} names of pages and links")

@@ -328,6 +328,7 @@ def api(folder, fault):
 def pages(folder, fault):
     """A page with one list, and indexes, about a small tree; the fault is (file, old, new), or an additional file."""
     tree = {
+        "CHANGELOG.md": "# Changelog\n\n## [0.1.0] - 2026-11-20\n" + "\n- line\n" * 79,
         "app/a.c": "int follow_ms;\n",
         "app/b.c": "int other;\n",
         "test/README.md": "| `run` | x |\n",
@@ -767,6 +768,8 @@ CASES = [
     (api, "doxygen", "a member without a word", "/// @file\n/// A header.\n\n/// A struct.\ntypedef struct {\n    int a;\n} iw_a_t;\n", True),
     (api, "doxygen", "a header that Doxygen would skip", "/// A header.\nvoid iw_f(void);\n", True),
     (pages, "python3", "clean", ("app/b.c", "other", "another"), False),
+    (pages, "python3", "a version with one line more than permitted", ("CHANGELOG.md", "2026-11-20\n", "2026-11-20\n- one more\n"), True),
+    (pages, "python3", "a changelog without versions", ("CHANGELOG.md", "## ", ""), True),
     (pages, "python3", "a file more has the example", ("app/b.c", "other", "follow_ms"), True),
     (pages, "python3", "a listed file no longer has it", ("app/a.c", "follow_ms", "other"), True),
     (pages, "python3", "a listed file is not there", ("docs/developer/how-to-add.md", "1. ", "1. `app/c.c`: gone.\n2. "), True),
