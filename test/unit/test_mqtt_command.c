@@ -95,6 +95,16 @@ TEST(test_command_response_topic_must_be_a_reply_of_this_machine) {
     }
 }
 
+TEST(test_refusal_is_sent_where_the_command_requests_it) {
+    TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_labelled("why", 0, "iwheel/w1/reply/other", 3));
+    TEST_ASSERT_NOT_NULL(strstr(order.why, "seq"));
+    TEST_ASSERT_EQUAL_STRING("other", order.to);
+    TEST_ASSERT_EQUAL_UINT16(3, order.correlation_length);
+    TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_labelled("unknown", 1, "iwheel/w1/reply/other", 0));
+    TEST_ASSERT_NOT_NULL(strstr(order.why, "no such command"));
+    TEST_ASSERT_EQUAL_STRING("other", order.to);
+}
+
 TEST(test_command_correlation_data_is_stored_up_to_its_limit) {
     TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_labelled("why", 1, NULL, 3));
     TEST_ASSERT_EQUAL_UINT16(3, order.correlation_length);

@@ -282,8 +282,22 @@ static const char *read_labels(const mqtt_rules_t *rules, const mqtt_command_t *
     return NULL;
 }
 
-/// Parses the sender, the verb and the JSON object. A stop needs neither `from` nor `seq`.
-static bool read_command(mqtt_judge_t *self, const mqtt_command_t *command, iwn_json_t *out_root, mqtt_order_t *order) {
+/// Reads `from` and `seq`. Returns NULL, or what is wrong with them.
+static const char *read_sender(iwn_json_t root, mqtt_order_t *order) {
+    if (!text_of(root, "from", order->from, sizeof order->from) || !mqtt_settings_is_name(order->from)) {
+        order->from[0] = '\0';
+        return "from must be a name";
+    }
+    if (!number_of(root, "seq", &order->seq) || order->seq < 1) {
+        order->seq = 0;
+        return "the command needs seq, a number from 1 on that increases with each command";
+    }
+    return NULL;
+}
+
+/// Parses the verb, the JSON object, its sender and where the answer goes. A stop needs only the object.
+static bool read_command(mqtt_judge_t *self, const mqtt_rules_t *rules, const mqtt_command_t *command,
+                         iwn_json_t *out_root, mqtt_order_t *order) {
     char fault[80];
     iwn_text_t words = iwn_text_begin(fault, sizeof fault);
     const bool known = find_verb(command->verb, &order->verb);
@@ -292,21 +306,14 @@ static bool read_command(mqtt_judge_t *self, const mqtt_command_t *command, iwn_
         iwn_json_kind(*out_root) != IWN_JSON_OBJECT) {
         return drop(order, MQTT_GARBLED, "not a JSON object");
     }
-    if (!text_of(*out_root, "from", order->from, sizeof order->from) || !mqtt_settings_is_name(order->from)) {
-        order->from[0] = '\0';
-        if (!is_stop(order->verb)) {
-            return drop(order, MQTT_GARBLED, "from must be a name");
-        }
-    }
+    const char *problem = read_sender(*out_root, order);
+    const char *labels = read_labels(rules, command, order); // Also of a bad sender: they name where the refusal goes.
     if (!known) {
-        return drop(order, MQTT_GARBLED, "there is no such command");
+        problem = "there is no such command";
+    } else if (problem == NULL) {
+        problem = labels;
     }
-    if (!number_of(*out_root, "seq", &order->seq) || order->seq < 1) {
-        order->seq = 0;
-        return is_stop(order->verb) ||
-               drop(order, MQTT_GARBLED, "the command needs seq, a number from 1 on that increases with each command");
-    }
-    return true;
+    return problem == NULL || is_stop(order->verb) || drop(order, MQTT_GARBLED, problem);
 }
 
 static bool is_allowed(const mqtt_rules_t *rules, mqtt_verb_t verb) {
@@ -316,13 +323,8 @@ static bool is_allowed(const mqtt_rules_t *rules, mqtt_verb_t verb) {
 static bool judge_command(mqtt_judge_t *self, const mqtt_rules_t *rules, const mqtt_command_t *command, uint64_t now_us,
                           mqtt_order_t *order) {
     iwn_json_t root;
-    if (!read_command(self, command, &root, order)) {
-        memcpy(order->to, order->from, sizeof order->to);
+    if (!read_command(self, rules, command, &root, order)) {
         return false;
-    }
-    const char *problem = read_labels(rules, command, order);
-    if (problem != NULL && !is_stop(order->verb)) {
-        return drop(order, MQTT_GARBLED, problem);
     }
     if (!write_request(root, order)) {
         return drop(order, MQTT_GARBLED, "it has a field that this command does not have, or an invalid value");

@@ -5,7 +5,7 @@
 /// Pure: no I/O, no clock, no heap. A command quotes `boot` and `t_us` of a message of this machine, and has a sender
 /// name `from` and a `seq` that increases. Its age is the monotonic time of this machine since `t_us`; no other clock
 /// is used. Commands that are retained, late, duplicated, out of order or from another run of the bridge are dropped
-/// and counted. A stop only needs its age: no `seq`, number of senders, unknown field or reason refuses it. The usable
+/// and counted. A stop only needs its age: no sender, `seq`, property, unknown field or reason refuses it. The usable
 /// part of the reason is passed on. `from` is a label: any client with the right to publish may use any name. The right
 /// to drive is the `key` of the reply to `arm`.
 ///
