@@ -1,18 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Details of the rules of the core. Each test kills a mutant that no other test kills.
-#include "gateway_rig.h"
-#include "message.h"
+#include "test_gateway_core_rig.h"
 #include "unit.h"
-
-static gateway_rig_t rig;
-
-void setUp(void) {
-    gateway_rig_init(&rig);
-}
-
-void tearDown(void) {
-    TEST_ASSERT_NULL_MESSAGE(rig.judge.violation, rig.judge.violation);
-}
 
 TEST(test_gateway_arm_with_two_pending_on_the_right_is_refused) {
     gateway_rig_run(&rig, MS(1000));
@@ -31,7 +20,7 @@ TEST(test_gateway_arm_with_an_excused_wheel_is_refused_as_lost) {
         gateway_rig_init(&rig);
         gateway_rig_run(&rig, MS(1000));
         rig.wheel[side].mute = true;
-        gateway_rig_stall(&rig, rig.wake_us - rig.now_us + MS(80));
+        stall_by(MS(80));
         rig.now_us += MS(5); // Long enough for telemetry of the other wheel
         gateway_rig_step(&rig);
         TEST_ASSERT_FALSE((rig.gateway.permit.present & (1U << IW_CAUSE_WHEEL_LOST)) != 0U);
@@ -41,8 +30,7 @@ TEST(test_gateway_arm_with_an_excused_wheel_is_refused_as_lost) {
 
 TEST(test_gateway_setpoints_are_no_telemetry) {
     gateway_rig_run(&rig, MS(1000));
-    rig.wheel[IW_LEFT].mute = true;
-    rig.wheel[IW_RIGHT].mute = true;
+    set_mute(true);
     gateway_rig_run(&rig, MS(100));
     const uint32_t received = rig.gateway.counters.received;
     for (unsigned i = 0; i < 30; i++) { // Longer than a second: the wheels count as offline anyway.
@@ -52,8 +40,7 @@ TEST(test_gateway_setpoints_are_no_telemetry) {
     }
     TEST_ASSERT_EQUAL_UINT32(received, rig.gateway.counters.received);
     TEST_ASSERT_EQUAL_UINT32(60, rig.gateway.counters.foreign);
-    rig.wheel[IW_LEFT].mute = false;
-    rig.wheel[IW_RIGHT].mute = false;
+    set_mute(false);
     gateway_rig_run(&rig, MS(100));
     TEST_ASSERT_EQUAL_UINT32(1, rig.gateway.wheel[IW_LEFT].reboots);
     TEST_ASSERT_EQUAL_UINT32(1, rig.gateway.wheel[IW_RIGHT].reboots);
@@ -61,8 +48,7 @@ TEST(test_gateway_setpoints_are_no_telemetry) {
 
 TEST(test_gateway_echo_is_no_telemetry) {
     gateway_rig_arm(&rig);
-    rig.wheel[IW_LEFT].mute = true;
-    rig.wheel[IW_RIGHT].mute = true;
+    set_mute(true);
     const uint32_t received = rig.gateway.counters.received;
     const uint32_t echoes = rig.gateway.counters.echoes;
     gateway_rig_run(&rig, MS(45));
@@ -72,8 +58,7 @@ TEST(test_gateway_echo_is_no_telemetry) {
 
 TEST(test_gateway_each_invalid_frame_is_counted_once) {
     gateway_rig_run(&rig, MS(1000));
-    rig.wheel[IW_LEFT].mute = true;
-    rig.wheel[IW_RIGHT].mute = true;
+    set_mute(true);
     gateway_rig_run(&rig, MS(10));
     const iw_counters_t before = rig.gateway.counters;
     fake_bus_put_empty(&rig.bus, IW_ID_LEFT_FORCE, 4);
@@ -95,12 +80,10 @@ TEST(test_gateway_each_invalid_frame_is_counted_once) {
 
 TEST(test_gateway_sign_fault_contradicts_with_source_bus) {
     gateway_rig_begin_apart(&rig);
-    gateway_rig_arm(&rig);
-    (void)gateway_rig_cruise(&rig, 120, 120, MS(600));
-    rig.wheel[IW_LEFT].rpm_fixed = true;
-    rig.wheel[IW_LEFT].rpm = -6;
+    arm_and_cruise(120, 120, MS(600));
+    turn(IW_LEFT, -6);
     (void)gateway_rig_cruise(&rig, 120, 120, MS(500));
-    TEST_ASSERT_EQUAL_INT(IW_CAUSE_FEEDBACK_SIGN, rig.gateway.permit.stop.cause);
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_FEEDBACK_SIGN, stop()->cause);
     TEST_ASSERT_TRUE(rig.gateway.permit.seen_us[IW_CAUSE_OVERSPEED] == IW_NEVER); // No other cause
     const iw_assumption_entry_t *const entry = &rig.gateway.assumptions.entry[IW_ASSUMPTION_FEEDBACK_SIGN_LEFT];
     TEST_ASSERT_EQUAL_INT(IW_CONTRADICTED, entry->state);
@@ -110,9 +93,9 @@ TEST(test_gateway_sign_fault_contradicts_with_source_bus) {
 TEST(test_gateway_software_estop_names_no_wheel) {
     gateway_rig_arm(&rig);
     iw_gateway_estop(&rig.gateway, rig.now_us, OTHER);
-    TEST_ASSERT_EQUAL_INT(IW_CAUSE_ESTOP_SOFTWARE, rig.gateway.permit.stop.cause);
-    TEST_ASSERT_EQUAL_UINT8(IW_SIDES_NONE, rig.gateway.permit.stop.sides);
-    TEST_ASSERT_EQUAL_UINT32(OTHER, rig.gateway.permit.stop.detail);
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_ESTOP_SOFTWARE, stop()->cause);
+    TEST_ASSERT_EQUAL_UINT8(IW_SIDES_NONE, stop()->sides);
+    TEST_ASSERT_EQUAL_UINT32(OTHER, stop()->detail);
     gateway_rig_step(&rig);
 }
 
@@ -147,8 +130,7 @@ TEST(test_gateway_lowest_current_is_the_documented_one) {
 }
 
 TEST(test_gateway_pair_refused_on_the_left_is_not_sent_right) {
-    gateway_rig_arm(&rig);
-    (void)gateway_rig_cruise(&rig, 300, 300, MS(500));
+    arm_and_cruise(300, 300, MS(500));
     gateway_rig_run(&rig, MS(5));
     const iw_time_us_t right_us = rig.bus.last_us[IW_RIGHT];
     rig.bus.send_result[IW_LEFT] = 0;
@@ -165,13 +147,10 @@ TEST(test_gateway_pair_refused_on_the_left_is_not_sent_right) {
 /// Sends force frames of the left wheel for a little more than two seconds, turning at this speed.
 static void receive_force(int16_t raw, int16_t rpm) {
     const message_t message = {IW_CODEC_FORCE, IW_LEFT, {.force = {.force_raw = raw}}};
-    iw_can_frame_t frame;
-    rig.wheel[IW_LEFT].rpm_fixed = true;
-    rig.wheel[IW_LEFT].rpm = rpm;
+    turn(IW_LEFT, rpm);
     for (unsigned i = 0; i < IW_FORCE_WINDOW_SAMPLES + 1U; i++) {
         gateway_rig_run(&rig, MS(50));
-        (void)message_encode(&message, &frame);
-        fake_bus_put(&rig.bus, &frame);
+        put(&message);
     }
     gateway_rig_run(&rig, MS(10));
 }
@@ -188,10 +167,8 @@ TEST(test_gateway_force_is_measured_up_to_rest_rpm) {
 TEST(test_gateway_old_force_observation_does_not_replace_operator) {
     const message_t message = {IW_CODEC_OFFSET, IW_LEFT, {.offset = {.offset_dN = 100}}};
     const iw_assumption_entry_t *const entry = &rig.gateway.assumptions.entry[IW_ASSUMPTION_FORCE_UNIT_LEFT];
-    iw_can_frame_t frame;
     gateway_rig_run(&rig, MS(500));
-    (void)message_encode(&message, &frame);
-    fake_bus_put(&rig.bus, &frame);
+    put(&message);
     receive_force(100, 0);
     TEST_ASSERT_EQUAL_INT(IW_CONTRADICTED, entry->state);
     iw_assumption_confirm(&rig.gateway.assumptions, IW_ASSUMPTION_FORCE_UNIT_LEFT, IW_SOURCE_OPERATOR, 0);
@@ -210,19 +187,17 @@ TEST(test_gateway_wheel_online_after_a_second_is_seen_booting) {
 
 TEST(test_gateway_offline_wheel_is_not_judged_by_its_old_speed) {
     gateway_rig_begin_apart(&rig);
-    gateway_rig_arm(&rig);
-    (void)gateway_rig_cruise(&rig, 120, 120, MS(600));
-    rig.wheel[IW_LEFT].rpm_fixed = true;
-    rig.wheel[IW_LEFT].rpm = -6;
+    arm_and_cruise(120, 120, MS(600));
+    turn(IW_LEFT, -6);
     (void)gateway_rig_cruise(&rig, 120, 120, MS(200));
     rig.wheel[IW_LEFT].mute = true;
-    gateway_rig_stall(&rig, rig.wake_us - rig.now_us + MS(80)); // Excuses the wheel for a short time.
-    (void)gateway_rig_cruise(&rig, 120, 120, MS(40));           // Backwards for 300 ms, if it still is.
-    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
+    stall_by(MS(80));                                 // Excuses the wheel for a short time.
+    (void)gateway_rig_cruise(&rig, 120, 120, MS(40)); // Backwards for 300 ms, if it still is.
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
     rig.wheel[IW_LEFT].mute = false;
     rig.wheel[IW_LEFT].rpm = 6;
     (void)gateway_rig_cruise(&rig, 120, 120, MS(1000));
-    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
 }
 
 /// Steps just before this time and at it.

@@ -1,32 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Faults while the wheels move: e-stop button, second master, offline or faulty wheels, late steps of the gateway.
-#include "gateway_rig.h"
+#include "test_gateway_core_rig.h"
 #include "unit.h"
-
-static gateway_rig_t rig;
-
-void setUp(void) {
-    gateway_rig_init(&rig);
-}
-
-void tearDown(void) {
-    TEST_ASSERT_NULL_MESSAGE(rig.judge.violation, rig.judge.violation);
-}
-
-static iw_state_t state(void) {
-    return iw_gateway_state(&rig.gateway);
-}
-
-static const iw_stop_t *stop(void) {
-    return &rig.gateway.permit.stop;
-}
-
-static void drive_on(void) {
-    gateway_rig_arm(&rig);
-    (void)gateway_rig_cruise(&rig, 400, 400, MS(1000));
-    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
-    TEST_ASSERT_EQUAL_INT(400, rig.bus.commanded_mm_s[IW_LEFT]);
-}
 
 static void assert_latched(iw_cause_t cause) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, state());
@@ -228,8 +203,7 @@ TEST(test_gateway_offline_wheel_latches_within_limit_and_period) {
 
 TEST(test_gateway_both_wheels_offline_are_both_named) {
     drive_on();
-    rig.wheel[IW_LEFT].mute = true;
-    rig.wheel[IW_RIGHT].mute = true;
+    set_mute(true);
     (void)gateway_rig_cruise(&rig, 400, 400, MS(80));
     assert_latched(IW_CAUSE_WHEEL_LOST);
     TEST_ASSERT_EQUAL_UINT8(IW_SIDES_BOTH, stop()->sides);
@@ -329,8 +303,7 @@ TEST(test_gateway_stall_at_the_limit_of_both_is_no_excuse_for_one) {
 TEST(test_gateway_wheel_offline_is_not_at_standstill) {
     for (int side = 0; side < IW_SIDES; side++) {
         setUp();
-        gateway_rig_arm(&rig);
-        (void)gateway_rig_cruise(&rig, 0, 0, MS(1000));
+        arm_and_cruise(0, 0, MS(1000));
         TEST_ASSERT_TRUE(rig.gateway.permit.view.settled);
         rig.wheel[side].mute = true;
         gateway_rig_run(&rig, MS(5000));
@@ -365,8 +338,7 @@ TEST(test_gateway_wheel_against_its_command_latches) {
     gateway_rig_begin_apart(&rig);
     drive_on();
     (void)gateway_rig_cruise(&rig, 120, 120, MS(500));
-    rig.wheel[IW_RIGHT].rpm_fixed = true;
-    rig.wheel[IW_RIGHT].rpm = -6;
+    turn(IW_RIGHT, -6);
     (void)gateway_rig_cruise(&rig, 120, 120, MS(295));
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
     (void)gateway_rig_cruise(&rig, 120, 120, MS(30));
@@ -380,8 +352,7 @@ TEST(test_gateway_wheel_against_its_command_latches) {
 TEST(test_gateway_overspeeding_wheel_latches) {
     gateway_rig_begin_apart(&rig);
     drive_on();
-    rig.wheel[IW_LEFT].rpm_fixed = true;
-    rig.wheel[IW_LEFT].rpm = 36;
+    turn(IW_LEFT, 36);
     (void)gateway_rig_cruise(&rig, 400, 400, MS(495));
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
     (void)gateway_rig_cruise(&rig, 400, 400, MS(30));
@@ -393,8 +364,7 @@ TEST(test_gateway_blocked_wheel_stops_with_a_ramp_and_no_latch) {
     gateway_rig_begin_apart(&rig);
     drive_on();
     (void)gateway_rig_cruise(&rig, 120, 120, MS(500));
-    rig.wheel[IW_LEFT].rpm_fixed = true;
-    rig.wheel[IW_LEFT].rpm = 1;
+    turn(IW_LEFT, 1);
     (void)gateway_rig_cruise(&rig, 120, 120, MS(995));
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
     const iw_refusal_t refusal = gateway_rig_cruise(&rig, 120, 120, MS(60));
@@ -407,8 +377,7 @@ TEST(test_gateway_blocked_wheel_stops_with_a_ramp_and_no_latch) {
 }
 
 TEST(test_gateway_pushed_wheel_while_listening_is_no_fault) {
-    rig.wheel[IW_LEFT].rpm_fixed = true;
-    rig.wheel[IW_LEFT].rpm = 60;
+    turn(IW_LEFT, 60);
     gateway_rig_run(&rig, MS(3000));
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, state());
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_AT_REST, gateway_rig_request_arm(&rig, HOLDER, false));
@@ -419,7 +388,7 @@ static void stall_in_motion(iw_time_us_t late_us) {
     setUp();
     drive_on();
     (void)gateway_rig_drive(&rig, HOLDER, 400, 400);
-    gateway_rig_stall(&rig, rig.wake_us - rig.now_us + late_us);
+    stall_by(late_us);
 }
 
 TEST(test_gateway_late_step_is_counted_above_20_ms) {
@@ -458,7 +427,7 @@ TEST(test_gateway_late_step_during_the_ramp_sends_zero) {
     gateway_rig_stop(&rig);
     gateway_rig_run(&rig, MS(60));
     TEST_ASSERT_FALSE(gateway_rig_commands_zero(&rig));
-    gateway_rig_stall(&rig, rig.wake_us - rig.now_us + MS(150));
+    stall_by(MS(150));
     TEST_ASSERT_TRUE(gateway_rig_commands_zero(&rig));
 }
 
@@ -466,7 +435,7 @@ TEST(test_gateway_late_step_does_not_change_the_loss_of_a_wheel) {
     drive_on();
     (void)gateway_rig_drive(&rig, HOLDER, 400, 400);
     rig.wheel[IW_LEFT].mute = true;
-    gateway_rig_stall(&rig, rig.wake_us - rig.now_us + MS(60));
+    stall_by(MS(60));
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
     gateway_rig_run(&rig, MS(45));
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
@@ -478,7 +447,7 @@ TEST(test_gateway_backlog_after_a_late_step_has_unknown_age) {
     drive_on();
     (void)gateway_rig_drive(&rig, HOLDER, 400, 400);
     rig.bus.flood = 900;
-    gateway_rig_stall(&rig, rig.wake_us - rig.now_us + MS(60));
+    stall_by(MS(60));
     TEST_ASSERT_TRUE(rig.gateway.backlog);
     TEST_ASSERT_EQUAL_UINT64(rig.now_us, rig.wake_us);
     gateway_rig_step(&rig);

@@ -1,18 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Observations of the wheels without motion: units, offsets, lengths, pose, reboots.
-#include "gateway_rig.h"
-#include "message.h"
+#include "test_gateway_core_rig.h"
 #include "unit.h"
-
-static gateway_rig_t rig;
-
-void setUp(void) {
-    gateway_rig_init(&rig);
-}
-
-void tearDown(void) {
-    TEST_ASSERT_NULL_MESSAGE(rig.judge.violation, rig.judge.violation);
-}
 
 static const iw_assumption_entry_t *entry(iw_assumption_item_t item) {
     return &rig.gateway.assumptions.entry[item];
@@ -21,12 +10,6 @@ static const iw_assumption_entry_t *entry(iw_assumption_item_t item) {
 static void assert_entry(iw_assumption_item_t item, iw_assumption_state_t state, iw_source_t source) {
     TEST_ASSERT_EQUAL_INT(state, entry(item)->state);
     TEST_ASSERT_EQUAL_INT(source, entry(item)->source);
-}
-
-static void put(const message_t *message) {
-    iw_can_frame_t frame;
-    TEST_ASSERT_EQUAL_INT(IW_OK, message_encode(message, &frame));
-    fake_bus_put(&rig.bus, &frame);
 }
 
 static void put_offset(iw_side_t side, int16_t offset_dN) {
@@ -110,8 +93,7 @@ TEST(test_gateway_unclear_unit_changes_no_assumption) {
 }
 
 TEST(test_gateway_turning_wheel_contaminates_its_own_window_only) {
-    rig.wheel[IW_LEFT].rpm_fixed = true;
-    rig.wheel[IW_LEFT].rpm = 3;
+    turn(IW_LEFT, 3);
     gateway_rig_run(&rig, MS(20));
     press_for(IW_LEFT, 1000, MS(2100));
     press_for(IW_RIGHT, 100, MS(2100));
@@ -168,8 +150,7 @@ TEST(test_gateway_tare_of_both_names_the_refusing_left_wheel) {
     iw_side_t refused = IW_RIGHT;
     gateway_rig_run(&rig, MS(20));
     press_for(IW_RIGHT, 70, MS(2100));
-    rig.wheel[IW_LEFT].rpm_fixed = true;
-    rig.wheel[IW_LEFT].rpm = 10;
+    turn(IW_LEFT, 10);
     press_for(IW_LEFT, 700, MS(2100));
     const iw_force_t before = rig.gateway.force[IW_RIGHT];
     TEST_ASSERT_EQUAL_INT(IW_TARE_MOVING, iw_gateway_tare(&rig.gateway, rig.now_us, IW_SIDES_BOTH, &refused));
@@ -202,7 +183,7 @@ TEST(test_gateway_rebooted_wheel_reopens_its_force_window) {
     TEST_ASSERT_EQUAL_INT(IW_WINDOW_OPEN, rig.gateway.force[IW_LEFT].quality.window);
     TEST_ASSERT_TRUE(rig.gateway.force[IW_LEFT].boot_seen);
     TEST_ASSERT_EQUAL_INT(IW_WINDOW_OPEN, rig.gateway.force[IW_RIGHT].quality.window);
-    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_gateway_state(&rig.gateway));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, state());
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_CAUSE_PRESENT, gateway_rig_request_arm(&rig, HOLDER, false));
     TEST_ASSERT_EQUAL_HEX32(1U << IW_CAUSE_WHEEL_REBOOTED, iw_permit_present(&rig.gateway.permit, rig.now_us));
 }
@@ -231,8 +212,7 @@ TEST(test_gateway_pose_is_stored_with_its_time) {
 }
 
 TEST(test_gateway_driving_confirms_the_feedback_sign_once) {
-    gateway_rig_arm(&rig);
-    (void)gateway_rig_cruise(&rig, 200, -200, MS(300));
+    arm_and_cruise(200, -200, MS(300));
     assert_entry(IW_ASSUMPTION_FEEDBACK_SIGN_LEFT, IW_ASSUMED, entry(IW_ASSUMPTION_FEEDBACK_SIGN_LEFT)->source);
     (void)gateway_rig_cruise(&rig, 200, -200, MS(1200));
     assert_entry(IW_ASSUMPTION_FEEDBACK_SIGN_LEFT, IW_CONFIRMED, IW_SOURCE_BUS);
@@ -258,11 +238,10 @@ TEST(test_gateway_current_that_must_be_clamped_is_counted) {
 }
 
 TEST(test_gateway_right_frame_stopped_by_envelope_stops_left_too) {
-    gateway_rig_arm(&rig);
-    (void)gateway_rig_cruise(&rig, 100, 400, MS(1000));
+    arm_and_cruise(100, 400, MS(1000));
     rig.gateway.config.max_speed_mm_s = 200;
     gateway_rig_run(&rig, MS(20));
-    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, iw_gateway_state(&rig.gateway));
-    TEST_ASSERT_EQUAL_INT(IW_CAUSE_INTERNAL, rig.gateway.permit.stop.cause);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, state());
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_INTERNAL, stop()->cause);
     TEST_ASSERT_TRUE(gateway_rig_commands_zero(&rig));
 }

@@ -1,26 +1,12 @@
 // SPDX-License-Identifier: MIT
 // State that a late step does not change, and arm while the last zero is not yet echoed.
-#include "gateway_rig.h"
+#include "test_gateway_core_rig.h"
 #include "unit.h"
 
 #include <stdio.h>
 
-static gateway_rig_t rig;
-
-void setUp(void) {
-    gateway_rig_init(&rig);
-}
-
-void tearDown(void) {
-    TEST_ASSERT_NULL_MESSAGE(rig.judge.violation, rig.judge.violation);
-}
-
 static bool lost_reported(void) {
     return (rig.gateway.permit.present & (1U << IW_CAUSE_WHEEL_LOST)) != 0U;
-}
-
-static void stall_by(iw_time_us_t late_us) {
-    gateway_rig_stall(&rig, rig.wake_us - rig.now_us + late_us);
 }
 
 TEST(test_gateway_late_step_does_not_end_the_loss_of_a_wheel) {
@@ -64,7 +50,7 @@ TEST(test_gateway_arm_after_an_unechoed_zero_is_not_refused) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, iw_gateway_reset(&rig.gateway, rig.now_us));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, iw_gateway_arm(&rig.gateway, rig.now_us, HOLDER, false));
     gateway_rig_run(&rig, MS(30));
-    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
 }
 
 /// Makes steps that are each 30 ms late, while the holder continues to command.
@@ -79,37 +65,34 @@ static void crawl_for(iw_time_us_t for_us) {
 }
 
 TEST(test_gateway_repeated_late_steps_stop_like_one_long_stall) {
-    gateway_rig_arm(&rig);
-    (void)gateway_rig_cruise(&rig, 300, 300, MS(500));
+    arm_and_cruise(300, 300, MS(500));
     crawl_for(MS(60));
-    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
     crawl_for(MS(200));
-    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, iw_gateway_state(&rig.gateway));
-    TEST_ASSERT_EQUAL_INT(IW_CAUSE_LOOP_LATE, rig.gateway.permit.stop.cause);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, state());
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_LOOP_LATE, stop()->cause);
     TEST_ASSERT_TRUE(gateway_rig_commands_zero(&rig));
 }
 
 TEST(test_gateway_suspended_in_motion_latches_and_sends_zero) {
-    gateway_rig_arm(&rig);
-    (void)gateway_rig_cruise(&rig, 300, 300, MS(500));
+    arm_and_cruise(300, 300, MS(500));
     iw_gateway_suspended(&rig.gateway, MS(5000));
     gateway_rig_step(&rig);
-    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, iw_gateway_state(&rig.gateway));
-    TEST_ASSERT_EQUAL_INT(IW_CAUSE_LOOP_HUNG, rig.gateway.permit.stop.cause);
-    TEST_ASSERT_EQUAL_UINT32(5000, rig.gateway.permit.stop.detail);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, state());
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_LOOP_HUNG, stop()->cause);
+    TEST_ASSERT_EQUAL_UINT32(5000, stop()->detail);
     TEST_ASSERT_TRUE(gateway_rig_commands_zero(&rig));
     gateway_rig_step(&rig);
     TEST_ASSERT_EQUAL_UINT32(1, rig.gateway.counters.late_steps);
 }
 
 TEST(test_gateway_suspended_for_200_ms_stops) {
-    gateway_rig_arm(&rig);
-    (void)gateway_rig_cruise(&rig, 300, 300, MS(500));
+    arm_and_cruise(300, 300, MS(500));
     iw_gateway_suspended(&rig.gateway, MS(200));
     gateway_rig_step(&rig);
-    TEST_ASSERT_EQUAL_INT(IW_CAUSE_LOOP_LATE, rig.gateway.permit.stop.cause);
-    TEST_ASSERT_EQUAL_UINT32(200, rig.gateway.permit.stop.detail);
-    TEST_ASSERT_EQUAL_UINT8(IW_SIDES_NONE, rig.gateway.permit.stop.sides);
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_LOOP_LATE, stop()->cause);
+    TEST_ASSERT_EQUAL_UINT32(200, stop()->detail);
+    TEST_ASSERT_EQUAL_UINT8(IW_SIDES_NONE, stop()->sides);
     TEST_ASSERT_TRUE(gateway_rig_commands_zero(&rig));
 }
 
@@ -120,28 +103,26 @@ TEST(test_gateway_suspended_below_100_ms_continues_to_drive) {
     } cases[] = {{20000, 0}, {20001, 1}, {99999, 1}};
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         gateway_rig_init(&rig);
-        gateway_rig_arm(&rig);
-        (void)gateway_rig_cruise(&rig, 300, 300, MS(500));
+        arm_and_cruise(300, 300, MS(500));
         TEST_ASSERT_TRUE(rig.now_us < rig.wake_us); // The step is not late by the clock.
         iw_gateway_suspended(&rig.gateway, cases[i].for_us);
         gateway_rig_step(&rig);
         TEST_ASSERT_EQUAL_UINT32(cases[i].late_steps, rig.gateway.counters.late_steps);
-        TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
+        TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
         gateway_rig_run(&rig, MS(5)); // One step on time ends the time without judgement.
-        TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
+        TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
     }
 }
 
 TEST(test_gateway_suspended_again_after_a_late_step_stops) {
-    gateway_rig_arm(&rig);
-    (void)gateway_rig_cruise(&rig, 300, 300, MS(500));
+    arm_and_cruise(300, 300, MS(500));
     iw_gateway_suspended(&rig.gateway, MS(30));
     gateway_rig_step(&rig);
-    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
     iw_gateway_suspended(&rig.gateway, MS(200));
     gateway_rig_step(&rig);
-    TEST_ASSERT_EQUAL_INT(IW_CAUSE_LOOP_LATE, rig.gateway.permit.stop.cause);
-    TEST_ASSERT_EQUAL_UINT32(200, rig.gateway.permit.stop.detail);
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_LOOP_LATE, stop()->cause);
+    TEST_ASSERT_EQUAL_UINT32(200, stop()->detail);
 }
 
 TEST(test_gateway_backlog_after_a_punctual_step_has_known_age) {
@@ -164,8 +145,8 @@ TEST(test_gateway_backlog_of_a_late_step_counts_one_late_step) {
 }
 
 static void expect_no_side(iw_cause_t cause) {
-    TEST_ASSERT_EQUAL_INT(cause, rig.gateway.permit.stop.cause);
-    TEST_ASSERT_EQUAL_UINT8(IW_SIDES_NONE, rig.gateway.permit.stop.sides);
+    TEST_ASSERT_EQUAL_INT(cause, stop()->cause);
+    TEST_ASSERT_EQUAL_UINT8(IW_SIDES_NONE, stop()->sides);
 }
 
 TEST(test_gateway_causes_without_a_wheel_name_no_wheel) {
@@ -205,15 +186,14 @@ TEST(test_gateway_drive_older_than_arm_is_stale) {
 }
 
 TEST(test_gateway_drive_that_waited_renews_from_its_send_time) {
-    gateway_rig_arm(&rig);
-    (void)gateway_rig_cruise(&rig, 300, 300, MS(500));
+    arm_and_cruise(300, 300, MS(500));
     const iw_time_us_t sent_us = rig.now_us - MS(150);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, drive_sent(sent_us));
     gateway_rig_run(&rig, MS(49));
-    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
     gateway_rig_run(&rig, MS(2));
-    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, iw_gateway_state(&rig.gateway));
-    TEST_ASSERT_EQUAL_INT(IW_CAUSE_LEASE_LOST, rig.gateway.permit.stop.cause);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, state());
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_LEASE_LOST, stop()->cause);
 }
 
 /// The lease of arm of HOLDER still lasts, and a zero pair is sent at this time. The nonzero command of HOLDER arrives
@@ -232,7 +212,7 @@ static void drive_that_waited_too_long(void) {
 static void assert_armed_and_still(void) {
     for (unsigned i = 0; i < 50U; i++) {
         gateway_rig_run(&rig, MS(10));
-        TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
+        TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
         TEST_ASSERT_TRUE(gateway_rig_commands_zero(&rig));
     }
 }
@@ -252,8 +232,7 @@ TEST(test_gateway_stop_and_arm_at_one_time_drop_the_command) {
 }
 
 TEST(test_gateway_drive_that_waited_does_not_set_stale_time_back) {
-    gateway_rig_arm(&rig);
-    (void)gateway_rig_cruise(&rig, 300, 300, MS(500));
+    arm_and_cruise(300, 300, MS(500));
     const iw_time_us_t last_us = rig.gateway.permit.stale_us;
     (void)drive_sent(last_us - MS(100));
     TEST_ASSERT_EQUAL_UINT64(last_us, rig.gateway.permit.stale_us);
@@ -283,7 +262,7 @@ static const fault_t faults[] = {
 static void cruise_often_late(int32_t left_mm_s, int32_t right_mm_s, uint32_t late_ms, uint32_t every_ms,
                               uint32_t for_ms) {
     const iw_time_us_t until_us = rig.now_us + MS(for_ms);
-    while (rig.now_us < until_us && iw_gateway_state(&rig.gateway) == IW_STATE_ARMED) {
+    while (rig.now_us < until_us && state() == IW_STATE_ARMED) {
         (void)gateway_rig_cruise(&rig, left_mm_s, right_mm_s, MS(every_ms - late_ms));
         stall_by(MS(late_ms));
     }
@@ -300,15 +279,14 @@ TEST(test_gateway_often_late_detects_each_wheel_that_does_not_follow) {
             (void)snprintf(words, sizeof words, "%s, %u ms late in each %u ms", faults[i].name,
                            (unsigned)rates[k].late_ms, (unsigned)rates[k].every_ms);
             setUp();
-            gateway_rig_arm(&rig);
-            (void)gateway_rig_cruise(&rig, mm_s, mm_s, MS(1500));
+            arm_and_cruise(mm_s, mm_s, MS(1500));
             for (size_t side = 0; side < IW_SIDES; side++) {
                 rig.wheel[side].rpm_fixed = faults[i].rpm[side] != OBEYS;
                 rig.wheel[side].rpm = faults[i].rpm[side];
             }
             const iw_time_us_t since_us = rig.now_us;
             cruise_often_late(mm_s, mm_s, rates[k].late_ms, rates[k].every_ms, 4000);
-            TEST_ASSERT_EQUAL_INT_MESSAGE(faults[i].cause, rig.gateway.permit.stop.cause, words);
+            TEST_ASSERT_EQUAL_INT_MESSAGE(faults[i].cause, stop()->cause, words);
             TEST_ASSERT_LESS_THAN_UINT64_MESSAGE(MS(1500), rig.now_us - since_us, words);
             tearDown();
         }
@@ -324,7 +302,7 @@ TEST(test_gateway_often_late_does_not_stop_wheels_that_follow) {
         for (size_t i = 0; i < 3U * sizeof pairs / sizeof *pairs; i++) {
             const int32_t *const pair = pairs[i % (sizeof pairs / sizeof *pairs)];
             cruise_often_late(pair[IW_LEFT], pair[IW_RIGHT], late_ms[k], late_ms[k] + 30U, 1000);
-            TEST_ASSERT_EQUAL_INT_MESSAGE(IW_STATE_ARMED, iw_gateway_state(&rig.gateway), "it stopped");
+            TEST_ASSERT_EQUAL_INT_MESSAGE(IW_STATE_ARMED, state(), "it stopped");
         }
         tearDown();
     }

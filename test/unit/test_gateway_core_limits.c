@@ -1,27 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Limits to the microsecond, and counters to the frame.
-#include "gateway_rig.h"
+#include "test_gateway_core_rig.h"
 #include "unit.h"
-
-static gateway_rig_t rig;
-
-void setUp(void) {
-    gateway_rig_init(&rig);
-}
-
-void tearDown(void) {
-    TEST_ASSERT_NULL_MESSAGE(rig.judge.violation, rig.judge.violation);
-}
-
-static iw_state_t state(void) {
-    return iw_gateway_state(&rig.gateway);
-}
-
-static void drive_on(void) {
-    gateway_rig_arm(&rig);
-    (void)gateway_rig_cruise(&rig, 400, 400, MS(1000));
-    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
-}
 
 /// Runs until the next pair is sent.
 static void run_to_next_pair(void) {
@@ -31,11 +11,9 @@ static void run_to_next_pair(void) {
     }
 }
 
-static void turn(int16_t rpm) {
-    for (size_t side = 0; side < IW_SIDES; side++) {
-        rig.wheel[side].rpm_fixed = true;
-        rig.wheel[side].rpm = rpm;
-    }
+static void turn_both(int16_t rpm) {
+    turn(IW_LEFT, rpm);
+    turn(IW_RIGHT, rpm);
 }
 
 TEST(test_gateway_counts_sent_and_refused_pairs) {
@@ -86,8 +64,8 @@ TEST(test_gateway_echo_is_overdue_at_its_limit_exactly) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
     gateway_rig_run(&rig, 1);
     gateway_rig_step(&rig);
-    TEST_ASSERT_EQUAL_INT(IW_CAUSE_SEND_STALLED, rig.gateway.permit.stop.cause);
-    TEST_ASSERT_EQUAL_UINT32(50, rig.gateway.permit.stop.detail);
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_SEND_STALLED, stop()->cause);
+    TEST_ASSERT_EQUAL_UINT32(50, stop()->detail);
 }
 
 TEST(test_gateway_delayed_zero_is_sent_with_the_first_echo) {
@@ -131,10 +109,10 @@ TEST(test_gateway_arm_in_the_zero_hold_sends_a_pair_immediately) {
 }
 
 TEST(test_gateway_standstill_counts_after_rest_ms_only) {
-    turn(30);
+    turn_both(30);
     gateway_rig_run(&rig, MS(1000));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_AT_REST, gateway_rig_request_arm(&rig, HOLDER, false));
-    turn(2);
+    turn_both(2);
     gateway_rig_run(&rig, MS(198));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_AT_REST, gateway_rig_request_arm(&rig, HOLDER, false));
     gateway_rig_run(&rig, MS(8));
@@ -144,8 +122,7 @@ TEST(test_gateway_standstill_counts_after_rest_ms_only) {
 TEST(test_gateway_arm_with_one_moving_wheel_is_refused) {
     for (size_t side = 0; side < IW_SIDES; side++) {
         setUp();
-        rig.wheel[side].rpm_fixed = true;
-        rig.wheel[side].rpm = 3;
+        turn(side, 3);
         gateway_rig_run(&rig, MS(1000));
         TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_AT_REST, gateway_rig_request_arm(&rig, HOLDER, false));
         tearDown();
@@ -155,10 +132,10 @@ TEST(test_gateway_arm_with_one_moving_wheel_is_refused) {
 TEST(test_gateway_hold_lasts_until_500_ms_of_standstill) {
     drive_on();
     gateway_rig_stop(&rig);
-    turn(5);
+    turn_both(5);
     gateway_rig_run(&rig, MS(3000));
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, state());
-    turn(0);
+    turn_both(0);
     gateway_rig_run(&rig, MS(495));
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, state());
     gateway_rig_run(&rig, MS(15));
@@ -169,7 +146,7 @@ TEST(test_gateway_hold_lasts_until_500_ms_of_standstill) {
 TEST(test_gateway_hold_ends_after_a_minute_with_a_rolling_wheel) {
     drive_on();
     gateway_rig_stop(&rig);
-    turn(5);
+    turn_both(5);
     gateway_rig_run(&rig, MS(55000));
     TEST_ASSERT_FALSE(gateway_rig_snapshot(&rig).zeros_ending);
     gateway_rig_run(&rig, MS(5200));
@@ -185,18 +162,17 @@ TEST(test_gateway_late_step_continues_the_comparison_of_speeds) {
     gateway_rig_begin_apart(&rig);
     drive_on();
     (void)gateway_rig_cruise(&rig, 120, 120, MS(500));
-    rig.wheel[IW_RIGHT].rpm_fixed = true;
-    rig.wheel[IW_RIGHT].rpm = -6;
+    turn(IW_RIGHT, -6);
     (void)gateway_rig_cruise(&rig, 120, 120, MS(250));
-    gateway_rig_stall(&rig, rig.wake_us - rig.now_us + MS(21)); // The wheel is still online.
+    stall_by(MS(21)); // The wheel is still online.
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
     (void)gateway_rig_cruise(&rig, 120, 120, MS(60));
-    TEST_ASSERT_EQUAL_INT(IW_CAUSE_FEEDBACK_SIGN, rig.gateway.permit.stop.cause);
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_FEEDBACK_SIGN, stop()->cause);
 }
 
 TEST(test_gateway_wheel_excused_by_a_late_step_is_not_online) {
     gateway_rig_run(&rig, MS(1000));
-    gateway_rig_stall(&rig, rig.wake_us - rig.now_us + MS(60));
+    stall_by(MS(60));
     rig.wheel[IW_RIGHT].mute = true;
     gateway_rig_run(&rig, MS(10));
     TEST_ASSERT_TRUE(iw_wheel_online(&rig.gateway.wheel[IW_LEFT], rig.now_us));
@@ -205,9 +181,7 @@ TEST(test_gateway_wheel_excused_by_a_late_step_is_not_online) {
 }
 
 TEST(test_gateway_step_drains_at_most_its_limit_of_frames) {
-    for (size_t side = 0; side < IW_SIDES; side++) {
-        rig.wheel[side].mute = true;
-    }
+    set_mute(true);
     gateway_rig_step(&rig);
     rig.bus.flood = IW_GATEWAY_DRAIN_MAX - 1U;
     gateway_rig_step(&rig);

@@ -1,38 +1,9 @@
 // SPDX-License-Identifier: MIT
 // The pair in the whole gateway: what is compared and when, which wheel is named, ramp or immediate zero, which request
 // is refused.
-#include "gateway_rig.h"
+#include "test_gateway_core_rig.h"
 
 #include "unit.h"
-
-static gateway_rig_t rig;
-
-void setUp(void) {
-    gateway_rig_init(&rig);
-}
-
-void tearDown(void) {
-    TEST_ASSERT_NULL_MESSAGE(rig.judge.violation, rig.judge.violation);
-}
-
-static iw_state_t state(void) {
-    return iw_gateway_state(&rig.gateway);
-}
-
-static const iw_stop_t *stop(void) {
-    return &rig.gateway.permit.stop;
-}
-
-static void drive_on(void) {
-    gateway_rig_arm(&rig);
-    (void)gateway_rig_cruise(&rig, 400, 400, MS(1000));
-    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
-}
-
-static void turn(iw_side_t side, int16_t rpm) {
-    rig.wheel[side].rpm_fixed = true;
-    rig.wheel[side].rpm = rpm;
-}
 
 static void assert_diverged(iw_side_t side, bool at_once) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, state());
@@ -80,8 +51,7 @@ TEST(test_gateway_pair_in_a_curve_as_commanded_does_not_diverge) {
 }
 
 TEST(test_gateway_wheel_blocked_in_a_ramp_ends_the_ramp) {
-    gateway_rig_arm(&rig);
-    (void)gateway_rig_cruise(&rig, 1000, 1000, MS(2000));
+    arm_and_cruise(1000, 1000, MS(2000));
     gateway_rig_stop(&rig);
     gateway_rig_run(&rig, MS(40));
     TEST_ASSERT_FALSE(gateway_rig_commands_zero(&rig));
@@ -93,8 +63,7 @@ TEST(test_gateway_wheel_blocked_in_a_ramp_ends_the_ramp) {
 }
 
 TEST(test_gateway_too_fast_wheel_in_a_ramp_does_not_end_it) {
-    gateway_rig_arm(&rig);
-    (void)gateway_rig_cruise(&rig, 1000, 1000, MS(2000));
+    arm_and_cruise(1000, 1000, MS(2000));
     turn(IW_LEFT, 49);
     gateway_rig_stop(&rig);
     gateway_rig_run(&rig, MS(420));
@@ -140,7 +109,7 @@ TEST(test_gateway_deviation_is_reset_by_a_lost_wheel_not_by_a_late_step) {
         const int32_t path_um = rig.gateway.diverge.path_um;
         TEST_ASSERT_TRUE(path_um > 20000 || path_um < -20000);
         rig.wheel[side].mute = true;
-        gateway_rig_stall(&rig, rig.wake_us - rig.now_us + MS(90));
+        stall_by(MS(90));
         TEST_ASSERT_FALSE(iw_wheel_online(&rig.gateway.wheel[side], rig.now_us));
         TEST_ASSERT_EQUAL_INT32(path_um, rig.gateway.diverge.path_um);
         gateway_rig_run(&rig, MS(20)); // Not online, and not late.
@@ -169,7 +138,7 @@ TEST(test_gateway_wheel_offline_is_not_compared_by_its_old_speed) {
 TEST(test_gateway_pair_after_a_late_loop_is_not_compared) {
     drive_on();
     (void)gateway_rig_drive(&rig, HOLDER, 400, 400);
-    gateway_rig_stall(&rig, rig.wake_us - rig.now_us + MS(110));
+    stall_by(MS(110));
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_LOOP_LATE, stop()->cause);
     turn(IW_LEFT, 15);
     gateway_rig_run(&rig, MS(500));
@@ -214,8 +183,7 @@ TEST(test_gateway_measured_speeds_are_mm_s_in_machine_frame) {
 }
 
 TEST(test_gateway_deviation_is_reported_in_whole_millimetres) {
-    gateway_rig_arm(&rig);
-    (void)gateway_rig_cruise(&rig, 1000, 1000, MS(2000));
+    arm_and_cruise(1000, 1000, MS(2000));
     TEST_ASSERT_EQUAL_INT32(1000, rig.gateway.diverge.applied_mm_s[IW_LEFT]);
     TEST_ASSERT_EQUAL_INT32(1000, rig.gateway.diverge.applied_mm_s[IW_RIGHT]);
     rig.gateway.diverge.path_um = 61000;
@@ -223,8 +191,7 @@ TEST(test_gateway_deviation_is_reported_in_whole_millimetres) {
     (void)iw_gateway_step(&rig.gateway, rig.now_us);
     TEST_ASSERT_EQUAL_UINT32(61, stop()->detail);
     setUp();
-    gateway_rig_arm(&rig);
-    (void)gateway_rig_cruise(&rig, 1000, 1000, MS(2000));
+    arm_and_cruise(1000, 1000, MS(2000));
     rig.gateway.diverge.path_um = 61999;
     rig.gateway.diverge.at_us = rig.now_us;
     (void)iw_gateway_step(&rig.gateway, rig.now_us);
@@ -248,8 +215,7 @@ TEST(test_gateway_deviation_restarts_with_each_drive) {
 
 TEST(test_gateway_third_divergence_within_a_minute_latches) {
     for (unsigned i = 0; i < 3U; i++) {
-        gateway_rig_arm(&rig);
-        (void)gateway_rig_cruise(&rig, 400, 400, MS(1000));
+        arm_and_cruise(400, 400, MS(1000));
         turn(IW_RIGHT, 0);
         (void)gateway_rig_cruise(&rig, 400, 400, MS(200));
         TEST_ASSERT_EQUAL_INT((i < 2U) ? IW_STATE_STOPPING : IW_STATE_LATCHED, state());
@@ -261,8 +227,7 @@ TEST(test_gateway_third_divergence_within_a_minute_latches) {
 }
 
 TEST(test_gateway_second_offline_wheel_ends_the_ramp) {
-    gateway_rig_arm(&rig);
-    (void)gateway_rig_cruise(&rig, 1000, 1000, MS(2000));
+    arm_and_cruise(1000, 1000, MS(2000));
     rig.wheel[IW_LEFT].mute = true;
     (void)gateway_rig_cruise(&rig, 1000, 1000, MS(20));
     rig.wheel[IW_RIGHT].mute = true;
@@ -277,8 +242,7 @@ TEST(test_gateway_second_offline_wheel_ends_the_ramp) {
 TEST(test_gateway_pair_is_compared_in_the_machine_frame) {
     rig.config.invert[IW_RIGHT] = true;
     gateway_rig_begin(&rig, false);
-    drive_on();
-    (void)gateway_rig_cruise(&rig, 400, 400, MS(2000));
+    arm_and_cruise(400, 400, MS(3000));
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
     TEST_ASSERT_LESS_THAN_INT32(5, gateway_rig_snapshot(&rig).pair_largest_mm);
 }

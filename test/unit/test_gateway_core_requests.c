@@ -1,22 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Requests of clients, and invalid frames on the bus that have no effect.
-#include "gateway_rig.h"
+#include "test_gateway_core_rig.h"
 #include "unit.h"
 #include <string.h>
-
-static gateway_rig_t rig;
-
-void setUp(void) {
-    gateway_rig_init(&rig);
-}
-
-void tearDown(void) {
-    TEST_ASSERT_NULL_MESSAGE(rig.judge.violation, rig.judge.violation);
-}
-
-static iw_state_t state(void) {
-    return iw_gateway_state(&rig.gateway);
-}
 
 /// Requests a drive without a step; `*out_applied` contains poison before.
 static iw_refusal_t ask(const iw_drive_t *request, iw_applied_t *out_applied) {
@@ -39,6 +25,21 @@ static void assert_refused(const iw_drive_t *request, iw_refusal_t expected) {
     TEST_ASSERT_EQUAL_MEMORY(&poison, &applied, sizeof poison);
     TEST_ASSERT_EQUAL_UINT64(lease_us, rig.gateway.permit.lease_until_us);
     TEST_ASSERT_EQUAL_MEMORY(&target, &rig.gateway.setpoint.target, sizeof target);
+}
+
+static void assert_currents(const iw_drive_t *request, int32_t left_mA, int32_t right_mA, bool limited) {
+    iw_applied_t applied;
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, ask(request, &applied));
+    TEST_ASSERT_EQUAL_INT(left_mA, applied.pair.wheel[IW_LEFT].current_mA);
+    TEST_ASSERT_EQUAL_INT(right_mA, applied.pair.wheel[IW_RIGHT].current_mA);
+    TEST_ASSERT_EQUAL_INT(limited, applied.limited);
+}
+
+/// Begins again with currents as setpoints, and arms.
+static void arm_with_current_setpoints(void) {
+    rig.config.current_role = IW_ROLE_SETPOINT;
+    gateway_rig_begin(&rig, false);
+    gateway_rig_arm(&rig);
 }
 
 TEST(test_refusal_text_exists_for_every_refusal) {
@@ -109,9 +110,7 @@ TEST(test_gateway_drive_without_current_requires_the_role_limit) {
     TEST_ASSERT_EQUAL_INT(100, applied.pair.wheel[IW_LEFT].speed_mm_s);
     TEST_ASSERT_EQUAL_INT(-50, applied.pair.wheel[IW_RIGHT].speed_mm_s);
     TEST_ASSERT_FALSE(applied.limited);
-    rig.config.current_role = IW_ROLE_SETPOINT;
-    gateway_rig_begin(&rig, false);
-    gateway_rig_arm(&rig);
+    arm_with_current_setpoints();
     assert_refused(&request, IW_REFUSE_MISSING_FIELD);
     TEST_ASSERT_EQUAL_UINT32(0, rig.gateway.counters.out_of_range);
     TEST_ASSERT_EQUAL_INT(HOLDER, rig.gateway.permit.stale_client);
@@ -119,13 +118,8 @@ TEST(test_gateway_drive_without_current_requires_the_role_limit) {
 
 TEST(test_gateway_negative_current_requires_the_role_setpoint) {
     const iw_drive_t request = {{100, 100}, {-2000, 2000}, true};
-    iw_applied_t applied;
-    rig.config.current_role = IW_ROLE_SETPOINT;
-    gateway_rig_begin(&rig, false);
-    gateway_rig_arm(&rig);
-    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, ask(&request, &applied));
-    TEST_ASSERT_EQUAL_INT(-2000, applied.pair.wheel[IW_LEFT].current_mA);
-    TEST_ASSERT_EQUAL_INT(2000, applied.pair.wheel[IW_RIGHT].current_mA);
+    arm_with_current_setpoints();
+    assert_currents(&request, -2000, 2000, false);
 }
 
 TEST(test_gateway_drive_above_the_maximum_scales_both_wheels) {
@@ -163,50 +157,28 @@ TEST(test_gateway_unequal_limits_become_the_larger_one) {
     const iw_drive_t request = {{600, 600}, {0, 2000}, true};
     const iw_drive_t low = {{600, 600}, {0, 299}, true};
     const iw_drive_t equal = {{600, 600}, {500, 500}, true};
-    const iw_drive_t stop = {{0, 0}, {500, 500}, true};
-    iw_applied_t applied;
+    const iw_drive_t zero = {{0, 0}, {500, 500}, true};
     gateway_rig_arm(&rig);
-    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, ask(&request, &applied));
-    TEST_ASSERT_EQUAL_INT(2000, applied.pair.wheel[IW_LEFT].current_mA);
-    TEST_ASSERT_EQUAL_INT(2000, applied.pair.wheel[IW_RIGHT].current_mA);
-    TEST_ASSERT_TRUE(applied.limited);
-    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, ask(&low, &applied));
-    TEST_ASSERT_EQUAL_INT(300, applied.pair.wheel[IW_LEFT].current_mA);
-    TEST_ASSERT_EQUAL_INT(300, applied.pair.wheel[IW_RIGHT].current_mA);
-    TEST_ASSERT_TRUE(applied.limited);
-    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, ask(&equal, &applied));
-    TEST_ASSERT_EQUAL_INT(500, applied.pair.wheel[IW_RIGHT].current_mA);
-    TEST_ASSERT_FALSE(applied.limited);
-    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, ask(&stop, &applied));
-    TEST_ASSERT_EQUAL_INT(2000, applied.pair.wheel[IW_LEFT].current_mA);
-    TEST_ASSERT_EQUAL_INT(2000, applied.pair.wheel[IW_RIGHT].current_mA);
-    TEST_ASSERT_TRUE(applied.limited);
+    assert_currents(&request, 2000, 2000, true);
+    assert_currents(&low, 300, 300, true);
+    assert_currents(&equal, 500, 500, false);
+    assert_currents(&zero, 2000, 2000, true);
 }
 
 /// A turn around a wheel at standstill is a command of motion, with the limit of the client.
 TEST(test_gateway_limit_applies_while_one_wheel_has_speed_zero) {
     static const iw_drive_t requests[] = {{{300, 0}, {500, 500}, true}, {{0, 300}, {500, 500}, true}};
-    iw_applied_t applied;
     gateway_rig_arm(&rig);
     for (size_t i = 0; i < 2U; i++) {
-        TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, ask(&requests[i], &applied));
-        TEST_ASSERT_EQUAL_INT(500, applied.pair.wheel[IW_LEFT].current_mA);
-        TEST_ASSERT_EQUAL_INT(500, applied.pair.wheel[IW_RIGHT].current_mA);
-        TEST_ASSERT_FALSE(applied.limited);
+        assert_currents(&requests[i], 500, 500, false);
     }
 }
 
 /// A current setpoint is not changed: it may be below any floor, unequal, and of either sign.
 TEST(test_gateway_current_setpoints_have_no_floor) {
     const iw_drive_t request = {{100, -100}, {5, -400}, true};
-    iw_applied_t applied;
-    rig.config.current_role = IW_ROLE_SETPOINT;
-    gateway_rig_begin(&rig, false);
-    gateway_rig_arm(&rig);
-    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, ask(&request, &applied));
-    TEST_ASSERT_EQUAL_INT(5, applied.pair.wheel[IW_LEFT].current_mA);
-    TEST_ASSERT_EQUAL_INT(-400, applied.pair.wheel[IW_RIGHT].current_mA);
-    TEST_ASSERT_FALSE(applied.limited);
+    arm_with_current_setpoints();
+    assert_currents(&request, 5, -400, false);
 }
 
 /// On the bus the limits are never unequal or below the floor, and the ramp to zero has the maximum.
@@ -245,23 +217,20 @@ TEST(test_gateway_current_alone_is_a_command_as_setpoint_only) {
 }
 
 TEST(test_gateway_lost_lease_and_disconnect_ramp) {
-    gateway_rig_arm(&rig);
-    (void)gateway_rig_cruise(&rig, 400, 400, MS(1000));
+    arm_and_cruise(400, 400, MS(1000));
     gateway_rig_run(&rig, MS(160));
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, state());
-    TEST_ASSERT_EQUAL_INT(IW_CAUSE_LEASE_LOST, rig.gateway.permit.stop.cause);
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_LEASE_LOST, stop()->cause);
     setUp();
-    gateway_rig_arm(&rig);
-    (void)gateway_rig_cruise(&rig, 400, 400, MS(1000));
+    arm_and_cruise(400, 400, MS(1000));
     iw_gateway_disconnect(&rig.gateway, rig.now_us, HOLDER);
     gateway_rig_run(&rig, MS(60));
-    TEST_ASSERT_EQUAL_INT(IW_CAUSE_CLIENT_GONE, rig.gateway.permit.stop.cause);
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_CLIENT_GONE, stop()->cause);
     TEST_ASSERT_TRUE(rig.bus.commanded_mm_s[IW_LEFT] < 400 && rig.bus.commanded_mm_s[IW_LEFT] > 250);
 }
 
 TEST(test_gateway_takeover_is_granted_at_standstill_only) {
-    gateway_rig_arm(&rig);
-    (void)gateway_rig_cruise(&rig, 400, 400, MS(500));
+    arm_and_cruise(400, 400, MS(500));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_BUSY, gateway_rig_request_arm(&rig, OTHER, false));
     TEST_ASSERT_TRUE(gateway_rig_request_arm(&rig, OTHER, true) != IW_REFUSE_NONE);
     (void)gateway_rig_cruise(&rig, 0, 0, MS(1500));
@@ -284,8 +253,7 @@ TEST(test_gateway_contradicted_timing_refuses_arm) {
 }
 
 TEST(test_gateway_arm_in_the_zero_hold_continues_without_gap) {
-    gateway_rig_arm(&rig);
-    (void)gateway_rig_cruise(&rig, 200, 200, MS(500));
+    arm_and_cruise(200, 200, MS(500));
     gateway_rig_stop(&rig);
     gateway_rig_run(&rig, MS(900));
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, state());
@@ -306,7 +274,7 @@ TEST(test_gateway_frames_of_bad_format_refresh_nothing) {
     }
     TEST_ASSERT_EQUAL_UINT32(40, rig.gateway.counters.bad_format);
     TEST_ASSERT_EQUAL_UINT32(0, rig.gateway.counters.foreign);
-    TEST_ASSERT_EQUAL_INT(IW_CAUSE_WHEEL_LOST, rig.gateway.permit.stop.cause);
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_WHEEL_LOST, stop()->cause);
 }
 
 TEST(test_gateway_short_frames_refresh_nothing_long_ones_do) {
@@ -323,7 +291,7 @@ TEST(test_gateway_short_frames_refresh_nothing_long_ones_do) {
         gateway_rig_run(&rig, MS(4));
     }
     TEST_ASSERT_EQUAL_UINT32(40, rig.gateway.counters.bad_length);
-    TEST_ASSERT_EQUAL_INT(IW_CAUSE_WHEEL_LOST, rig.gateway.permit.stop.cause);
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_WHEEL_LOST, stop()->cause);
 }
 
 TEST(test_gateway_unknown_ids_are_counted_without_effect) {
@@ -367,12 +335,11 @@ TEST(test_gateway_refused_arm_does_not_change_the_pending_arm) {
 }
 
 TEST(test_gateway_shutdown_ramps) {
-    gateway_rig_arm(&rig);
-    (void)gateway_rig_cruise(&rig, 400, 400, MS(1000));
+    arm_and_cruise(400, 400, MS(1000));
     iw_gateway_stop(&rig.gateway, rig.now_us, IW_CLIENT_NONE, IW_CAUSE_SHUTDOWN);
     gateway_rig_run(&rig, MS(100));
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, state());
-    TEST_ASSERT_EQUAL_INT(IW_CAUSE_SHUTDOWN, rig.gateway.permit.stop.cause);
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_SHUTDOWN, stop()->cause);
     TEST_ASSERT_FALSE(gateway_rig_commands_zero(&rig));
 }
 
@@ -380,8 +347,7 @@ TEST(test_gateway_release_ends_zeros_only_after_the_ramp) {
     rig.config.hold = true;
     gateway_rig_begin(&rig, false);
     gateway_rig_run(&rig, MS(1000));
-    gateway_rig_arm(&rig);
-    (void)gateway_rig_cruise(&rig, 400, 400, MS(1000));
+    arm_and_cruise(400, 400, MS(1000));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_AT_REST, iw_gateway_release(&rig.gateway));
     gateway_rig_stop(&rig);
     gateway_rig_run(&rig, MS(60000));

@@ -1,27 +1,12 @@
 // SPDX-License-Identifier: MIT
 // A machine that rolls without setpoints: the gateway detects it, without another effect.
-#include "gateway_rig.h"
+#include "test_gateway_core_rig.h"
 #include "unit.h"
-
-static gateway_rig_t rig;
 
 /// 120.6 mm/s and 100.5 mm/s, and the rpm below. With one more millimetre of radius the second speed is 101 mm/s.
 #define FAST_RPM  6
 #define LEAST_RPM 5
 #define SLOW_RPM  4
-
-void setUp(void) {
-    gateway_rig_init(&rig);
-}
-
-void tearDown(void) {
-    TEST_ASSERT_NULL_MESSAGE(rig.judge.violation, rig.judge.violation);
-}
-
-static void turn(size_t side, int16_t rpm) {
-    rig.wheel[side].rpm_fixed = true;
-    rig.wheel[side].rpm = rpm;
-}
 
 static bool rolls(void) {
     return gateway_rig_snapshot(&rig).rolling;
@@ -42,7 +27,7 @@ TEST(test_gateway_rolling_while_listening_is_detected) {
     TEST_ASSERT_TRUE(rolls());
     TEST_ASSERT_FALSE(is_fault());
     TEST_ASSERT_EQUAL_UINT32(frames, rig.judge.frames);
-    TEST_ASSERT_EQUAL_UINT32(0, rig.gateway.permit.stop.number);
+    TEST_ASSERT_EQUAL_UINT32(0, stop()->number);
     turn(IW_LEFT, 0);
     turn(IW_RIGHT, 0);
     gateway_rig_run(&rig, MS(350));
@@ -78,14 +63,13 @@ TEST(test_gateway_rolling_after_power_on_is_no_fault) {
 
 /// A driven wheel does not roll, nor a wheel that is commanded zero.
 TEST(test_gateway_rolling_is_not_judged_while_setpoints_are_sent) {
-    gateway_rig_arm(&rig);
-    (void)gateway_rig_cruise(&rig, 300, 300, MS(1000));
+    arm_and_cruise(300, 300, MS(1000));
     TEST_ASSERT_FALSE(rolls());
     gateway_rig_stop(&rig);
     turn(IW_LEFT, FAST_RPM);
     turn(IW_RIGHT, FAST_RPM);
     gateway_rig_run(&rig, MS(5000));
-    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, iw_gateway_state(&rig.gateway));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, state());
     TEST_ASSERT_FALSE(rolls());
 }
 
@@ -93,7 +77,7 @@ TEST(test_gateway_rolling_soon_after_the_zeros_is_a_fault) {
     gateway_rig_arm(&rig);
     gateway_rig_stop(&rig);
     gateway_rig_run(&rig, MS(2000));
-    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_gateway_state(&rig.gateway));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, state());
     gateway_rig_run(&rig, MS(9000));
     turn(IW_RIGHT, -FAST_RPM);
     gateway_rig_run(&rig, MS(400));

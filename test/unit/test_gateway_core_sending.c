@@ -1,30 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Setpoints: what is sent and when, and the effect if it cannot be sent.
-#include "gateway_rig.h"
+#include "test_gateway_core_rig.h"
 #include "unit.h"
-
-static gateway_rig_t rig;
-
-void setUp(void) {
-    gateway_rig_init(&rig);
-}
-
-void tearDown(void) {
-    TEST_ASSERT_NULL_MESSAGE(rig.judge.violation, rig.judge.violation);
-}
-
-static iw_state_t state(void) {
-    return iw_gateway_state(&rig.gateway);
-}
-
-/// Arms and drives straight ahead with 400 mm/s.
-static void drive_on(void) {
-    gateway_rig_arm(&rig);
-    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
-    (void)gateway_rig_cruise(&rig, 400, 400, MS(1000));
-    TEST_ASSERT_EQUAL_INT(400, rig.bus.commanded_mm_s[IW_LEFT]);
-    TEST_ASSERT_EQUAL_INT(400, rig.bus.commanded_mm_s[IW_RIGHT]);
-}
 
 TEST(test_gateway_armed_sends_zero_pairs_until_the_first_drive) {
     gateway_rig_arm(&rig);
@@ -111,8 +88,7 @@ TEST(test_gateway_zero_for_right_does_not_wait_for_left) {
 TEST(test_gateway_inverted_wheel_receives_the_negated_speed) {
     rig.config.invert[IW_RIGHT] = true;
     gateway_rig_begin(&rig, false);
-    gateway_rig_arm(&rig);
-    (void)gateway_rig_cruise(&rig, 300, 300, MS(1000));
+    arm_and_cruise(300, 300, MS(1000));
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
     TEST_ASSERT_EQUAL_INT(300, rig.bus.commanded_mm_s[IW_LEFT]);
     TEST_ASSERT_EQUAL_INT(-300, rig.bus.commanded_mm_s[IW_RIGHT]);
@@ -123,8 +99,7 @@ TEST(test_gateway_inverted_wheel_receives_the_negated_current) {
     rig.config.invert[IW_LEFT] = true;
     rig.config.current_role = IW_ROLE_SETPOINT;
     gateway_rig_begin(&rig, false);
-    gateway_rig_arm(&rig);
-    (void)gateway_rig_cruise(&rig, 300, 300, MS(1000));
+    arm_and_cruise(300, 300, MS(1000));
     TEST_ASSERT_EQUAL_INT(-300, rig.bus.commanded_mm_s[IW_LEFT]);
     TEST_ASSERT_EQUAL_INT(-150, fake_bus_command(&rig.bus.last[IW_LEFT]).current_mA);
     TEST_ASSERT_EQUAL_INT(150, fake_bus_command(&rig.bus.last[IW_RIGHT]).current_mA);
@@ -171,7 +146,7 @@ TEST(test_gateway_pair_that_is_never_sent_is_a_stalled_send) {
     rig.bus.send_result[IW_RIGHT] = 0;
     (void)gateway_rig_cruise(&rig, 400, 400, MS(120));
     TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, state());
-    TEST_ASSERT_EQUAL_INT(IW_CAUSE_SEND_STALLED, rig.gateway.permit.stop.cause);
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_SEND_STALLED, stop()->cause);
     TEST_ASSERT_EQUAL_INT(0, fake_bus_command(&rig.bus.last[IW_LEFT]).speed_mm_s);
 }
 
@@ -194,8 +169,8 @@ TEST(test_gateway_bus_down_in_motion_latches_and_sends_zero_first) {
         fake_bus_break(&rig.bus, states[i]);
         gateway_rig_step(&rig);
         TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, state());
-        TEST_ASSERT_EQUAL_INT(IW_CAUSE_BUS_DOWN, rig.gateway.permit.stop.cause);
-        TEST_ASSERT_EQUAL_UINT32(states[i], rig.gateway.permit.stop.detail);
+        TEST_ASSERT_EQUAL_INT(IW_CAUSE_BUS_DOWN, stop()->cause);
+        TEST_ASSERT_EQUAL_UINT32(states[i], stop()->detail);
         gateway_rig_run(&rig, MS(300));
         TEST_ASSERT_EQUAL_UINT32(sent, rig.bus.sent);
         TEST_ASSERT_EQUAL_INT(IW_REFUSE_BUS_DOWN, gateway_rig_reset(&rig));

@@ -1,33 +1,17 @@
 // SPDX-License-Identifier: MIT
 // Silence after the zeros: setpoints that are still in a controller are withdrawn or reported.
-#include "gateway_rig.h"
+#include "test_gateway_core_rig.h"
 #include "unit.h"
-
-static gateway_rig_t rig;
-
-void setUp(void) {
-    gateway_rig_init(&rig);
-}
-
-void tearDown(void) {
-    TEST_ASSERT_NULL_MESSAGE(rig.judge.violation, rig.judge.violation);
-}
-
-static iw_state_t state(void) {
-    return iw_gateway_state(&rig.gateway);
-}
 
 /// Switches both wheels: without power they neither acknowledge nor send.
 static void set_power(bool on) {
     rig.bus.acknowledged = on;
-    rig.wheel[IW_LEFT].mute = !on;
-    rig.wheel[IW_RIGHT].mute = !on;
+    set_mute(!on);
 }
 
-static void drive_on(void) {
-    gateway_rig_arm(&rig);
-    (void)gateway_rig_cruise(&rig, 400, 400, MS(1000));
-    TEST_ASSERT_EQUAL_INT(400, rig.bus.commanded_mm_s[IW_LEFT]);
+/// Drives, and runs until the last pair is echoed.
+static void drive_on_and_echo(void) {
+    drive_on();
     gateway_rig_run(&rig, MS(1));
 }
 
@@ -42,7 +26,7 @@ static void run_to_silence(void) {
 
 /// Cuts the power in motion. Ends with the zeros.
 static void cut_power_in_motion(int purge_result) {
-    drive_on();
+    drive_on_and_echo();
     rig.bus.purge_result = purge_result;
     set_power(false);
     (void)gateway_rig_cruise(&rig, 400, 400, MS(100));
@@ -75,7 +59,7 @@ static void expect_silence_with_power(void) {
 }
 
 TEST(test_gateway_missing_echo_latches_and_purges) {
-    drive_on();
+    drive_on_and_echo();
     const uint32_t sent = rig.bus.sent;
     rig.bus.acknowledged = false;
     (void)gateway_rig_cruise(&rig, 400, 400, MS(50));
@@ -83,8 +67,8 @@ TEST(test_gateway_missing_echo_latches_and_purges) {
     TEST_ASSERT_EQUAL_UINT32(sent + 2U, rig.bus.sent);
     (void)gateway_rig_cruise(&rig, 400, 400, MS(50));
     TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, state());
-    TEST_ASSERT_EQUAL_INT(IW_CAUSE_SEND_STALLED, rig.gateway.permit.stop.cause);
-    TEST_ASSERT_UINT32_WITHIN(20, 60, rig.gateway.permit.stop.detail);
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_SEND_STALLED, stop()->cause);
+    TEST_ASSERT_UINT32_WITHIN(20, 60, stop()->detail);
     for (unsigned n = 0; n < 1100U && rig.gateway.permit.phase == IW_PHASE_CUT; n++) {
         TEST_ASSERT_EQUAL_UINT32(1, rig.bus.purges);
         TEST_ASSERT_FALSE(rig.gateway.left_behind);
@@ -97,7 +81,7 @@ TEST(test_gateway_missing_echo_latches_and_purges) {
 }
 
 TEST(test_gateway_purged_frames_are_never_sent) {
-    drive_on();
+    drive_on_and_echo();
     rig.bus.acknowledged = false;
     rig.bus.purge_result = 1;
     (void)gateway_rig_cruise(&rig, 400, 400, MS(100));
@@ -156,7 +140,7 @@ TEST(test_gateway_zeros_after_a_crash_are_purged_once_before_end) {
 }
 
 TEST(test_gateway_reset_during_zeros_purges_unechoed_frames) {
-    drive_on();
+    drive_on_and_echo();
     iw_gateway_estop(&rig.gateway, rig.now_us, OTHER);
     gateway_rig_run(&rig, MS(1100));
     rig.bus.purge_result = 1;
@@ -282,7 +266,7 @@ TEST(test_gateway_failed_arm_after_a_stop_is_purged_once) {
     gateway_rig_arm(&rig);
     gateway_rig_stop(&rig);
     run_to_silence();
-    TEST_ASSERT_NOT_EQUAL_UINT32(rig.gateway.purged_stop, rig.gateway.permit.stop.number);
+    TEST_ASSERT_NOT_EQUAL_UINT32(rig.gateway.purged_stop, stop()->number);
     arm_in_vain(0);
     TEST_ASSERT_EQUAL_UINT32(1, rig.bus.purges);
 }

@@ -1,31 +1,8 @@
 // SPDX-License-Identifier: MIT
 // From init to ARMED: silence, the pair of arm and its echo, listen-only, start after a crash.
-#include "gateway_rig.h"
+#include "test_gateway_core_rig.h"
 #include "unit.h"
 #include <string.h>
-
-static gateway_rig_t rig;
-
-void setUp(void) {
-    gateway_rig_init(&rig);
-}
-
-void tearDown(void) {
-    TEST_ASSERT_NULL_MESSAGE(rig.judge.violation, rig.judge.violation);
-}
-
-static iw_state_t state(void) {
-    return iw_gateway_state(&rig.gateway);
-}
-
-/// Arms and drives straight ahead with 400 mm/s.
-static void drive_on(void) {
-    gateway_rig_arm(&rig);
-    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
-    (void)gateway_rig_cruise(&rig, 400, 400, MS(1000));
-    TEST_ASSERT_EQUAL_INT(400, rig.bus.commanded_mm_s[IW_LEFT]);
-    TEST_ASSERT_EQUAL_INT(400, rig.bus.commanded_mm_s[IW_RIGHT]);
-}
 
 TEST(test_gateway_init_refuses_bad_configuration_without_change) {
     static uint8_t poison[sizeof(iw_gateway_t)];
@@ -138,8 +115,7 @@ TEST(test_gateway_restarted_sends_zeros_then_listens) {
 TEST(test_gateway_restarted_without_track_sends_zeros_never_arms) {
     rig.config.track_mm = 0;
     gateway_rig_begin(&rig, true);
-    rig.wheel[IW_LEFT].rpm_fixed = true;
-    rig.wheel[IW_LEFT].rpm = 40;
+    turn(IW_LEFT, 40);
     gateway_rig_run(&rig, MS(1400));
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, state());
     TEST_ASSERT_UINT32_WITHIN(4, 140, rig.bus.sent);

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Random walk: clients, buttons, faults and delays at random; the invariants are checked after each step.
-#include "gateway_rig.h"
+#include "test_gateway_core_rig.h"
 #include "unit.h"
 
-static gateway_rig_t rig;
 static fixture_random_t chance;
 
 /// Counts the events: a walk without events proves nothing.
@@ -13,10 +12,6 @@ typedef struct {
     uint32_t resets;
     uint32_t stops;
 } tally_t;
-
-void setUp(void) {
-    gateway_rig_init(&rig);
-}
 
 static iw_client_t any_client(void) {
     return (fixture_random_in(&chance, 0, 3) == 0) ? OTHER : HOLDER;
@@ -146,7 +141,7 @@ static void random_event(void) {
 }
 
 static void count(tally_t *tally, iw_state_t before) {
-    const iw_state_t after = iw_gateway_state(&rig.gateway);
+    const iw_state_t after = state();
     tally->armed += (after == IW_STATE_ARMED && before != after) ? 1U : 0U;
     tally->latched += (after == IW_STATE_LATCHED && before != after) ? 1U : 0U;
     tally->stops += (after == IW_STATE_STOPPING && before != after) ? 1U : 0U;
@@ -158,7 +153,7 @@ static void walk(uint32_t seed, uint32_t steps) {
     fixture_random_init(&chance, seed);
     rig.speed_period_us = MS(16);
     while (rig.steps < steps) {
-        const iw_state_t before = iw_gateway_state(&rig.gateway);
+        const iw_state_t before = state();
         random_event();
         count(&tally, before);
         TEST_ASSERT_NULL_MESSAGE(rig.judge.violation, rig.judge.violation);

@@ -1,19 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Yaw in the whole gateway: the reply to a client, the sent setpoints, and stops out of a turn, which are never
 // delayed.
-#include "gateway_rig.h"
+#include "test_gateway_core_rig.h"
 
 #include "unit.h"
-
-static gateway_rig_t rig;
-
-void setUp(void) {
-    gateway_rig_init(&rig);
-}
-
-void tearDown(void) {
-    TEST_ASSERT_NULL_MESSAGE(rig.judge.violation, rig.judge.violation);
-}
 
 static iw_applied_t ask(int32_t left_mm_s, int32_t right_mm_s) {
     const iw_drive_t request = {{left_mm_s, right_mm_s}, {0, 0}, false};
@@ -104,7 +94,7 @@ TEST(test_gateway_pivot_in_reverse_passes_the_envelope) {
         TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_cruise(&rig, speed, -speed, MS(350)));
         TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_cruise(&rig, 900, 400, MS(300)));
     }
-    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
     TEST_ASSERT_EQUAL_UINT32(0, gateway_rig_snapshot(&rig).stopped);
 }
 
@@ -114,9 +104,9 @@ TEST(test_gateway_yaw_too_fast_is_stopped_by_the_envelope) {
     rig.gateway.setpoint.yaw.most_mm_s = 2000;
     rig.gateway.setpoint.yaw.growth_mm_s2 = 1080;
     (void)gateway_rig_cruise(&rig, -400, 400, MS(900));
-    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, iw_gateway_state(&rig.gateway));
-    TEST_ASSERT_EQUAL_INT(IW_CAUSE_INTERNAL, rig.gateway.permit.stop.cause);
-    TEST_ASSERT_EQUAL_UINT32(IW_ENVELOPE_YAW, rig.gateway.permit.stop.detail);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, state());
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_INTERNAL, stop()->cause);
+    TEST_ASSERT_EQUAL_UINT32(IW_ENVELOPE_YAW, stop()->detail);
     TEST_ASSERT_TRUE(gateway_rig_commands_zero(&rig));
 }
 
@@ -124,7 +114,7 @@ TEST(test_gateway_yaw_growth_too_fast_is_stopped_by_the_envelope) {
     gateway_rig_arm(&rig);
     rig.gateway.setpoint.yaw.growth_mm_s2 = 1600;
     (void)gateway_rig_cruise(&rig, -200, 200, MS(100));
-    TEST_ASSERT_EQUAL_INT(IW_CAUSE_INTERNAL, rig.gateway.permit.stop.cause);
-    TEST_ASSERT_EQUAL_UINT32(IW_ENVELOPE_YAW, rig.gateway.permit.stop.detail);
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_INTERNAL, stop()->cause);
+    TEST_ASSERT_EQUAL_UINT32(IW_ENVELOPE_YAW, stop()->detail);
     TEST_ASSERT_TRUE(gateway_rig_commands_zero(&rig));
 }

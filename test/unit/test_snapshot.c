@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
 // A snapshot, the only interface for reading: it equals the state of the parts of the gateway in every state, and no
 // field is missing.
-#include "gateway_rig.h"
-#include "message.h"
+#include "test_gateway_core_rig.h"
 #include "unit.h"
 
 #include <string.h>
@@ -33,16 +32,6 @@ static const place_t places[] = {
     PLACE(rolling),      PLACE(rolling_fault), PLACE(left_behind),
 };
 #define PLACES (sizeof places / sizeof places[0])
-
-static gateway_rig_t rig;
-
-void setUp(void) {
-    gateway_rig_init(&rig);
-}
-
-void tearDown(void) {
-    TEST_ASSERT_NULL_MESSAGE(rig.judge.violation, rig.judge.violation);
-}
 
 static void assert_wheel(const iw_snapshot_wheel_t *seen, iw_side_t side, iw_time_us_t now_us) {
     const iw_wheel_t *wheel = &rig.gateway.wheel[side];
@@ -82,7 +71,7 @@ static void assert_permit(const iw_snapshot_t *seen, iw_time_us_t now_us) {
     TEST_ASSERT_EQUAL_INT(iw_permit_state(permit), seen->state);
     TEST_ASSERT_EQUAL_INT(permit->arm_refusal, seen->arm_refusal);
     TEST_ASSERT_EQUAL_INT(iw_permit_arming(permit), seen->arming);
-    TEST_ASSERT_EQUAL_INT(seen->state, iw_gateway_state(&rig.gateway));
+    TEST_ASSERT_EQUAL_INT(seen->state, state());
     TEST_ASSERT_EQUAL_INT(seen->arming, iw_gateway_arming(&rig.gateway));
     TEST_ASSERT_EQUAL_INT(seen->arm_refusal, iw_gateway_arm_refusal(&rig.gateway));
     TEST_ASSERT_EQUAL_INT(iw_permit_demand(permit) != IW_DEMAND_SILENCE, iw_gateway_is_sending(&rig.gateway));
@@ -135,13 +124,6 @@ static iw_snapshot_t snapshot(void) {
     return snapshot_at(rig.now_us);
 }
 
-static void put(iw_codec_kind_t kind, iw_side_t side, const iw_codec_wheel_t *as) {
-    const message_t message = {kind, side, *as};
-    iw_can_frame_t frame;
-    TEST_ASSERT_EQUAL_INT(IW_OK, message_encode(&message, &frame));
-    fake_bus_put(&rig.bus, &frame);
-}
-
 TEST(test_snapshot_no_field_is_missing_in_this_test) {
     size_t end = 0;
     for (size_t i = 0; i < PLACES; i++) {
@@ -178,8 +160,8 @@ TEST(test_snapshot_before_the_first_frame_has_no_telemetry) {
 }
 
 TEST(test_snapshot_listening_has_telemetry_and_its_time) {
-    const iw_codec_wheel_t force = {.force = {0, 200}};
-    const iw_codec_wheel_t pose = {.pose = {1, 2, 3, 4}};
+    const message_t force = {IW_CODEC_FORCE, IW_RIGHT, {.force = {0, 200}}};
+    const message_t pose = {IW_CODEC_POSE, IW_RIGHT, {.pose = {1, 2, 3, 4}}};
     rig.config.invert[IW_RIGHT] = true;
     gateway_rig_begin(&rig, false);
     gateway_rig_run(&rig, MS(5)); // Each wheel has sent its ticks once: counting starts there.
@@ -188,8 +170,8 @@ TEST(test_snapshot_listening_has_telemetry_and_its_time) {
         (rig_wheel_t){false, true, 9, 11, rig.wheel[IW_RIGHT].speed_us, rig.wheel[IW_RIGHT].status_us};
     gateway_rig_run(&rig, MS(295));
     rig.now_us += 100U;
-    put(IW_CODEC_FORCE, IW_RIGHT, &force);
-    put(IW_CODEC_POSE, IW_RIGHT, &pose);
+    put(&force);
+    put(&pose);
     gateway_rig_step(&rig);
     const iw_snapshot_t seen = snapshot_at(rig.now_us + 50U);
     TEST_ASSERT_EQUAL_UINT64(50, seen.at_us - seen.pose_us);
