@@ -205,6 +205,30 @@ void tearDown(void) {
     (void)rmdir(folder);
 }
 
+void client_closes(void) {
+    (void)close(client_fd);
+    client_fd = -1;
+}
+
+void begin_with_the_board(void) {
+    if (step == 2U) {
+        board_links(EARLY);
+    }
+    if (step % 1000U == 999U) {
+        board_links(EARLY + step);
+    }
+}
+
+void begin_with_a_client(void) {
+    begin_with_the_board();
+    if (step == 10U) {
+        client_connects();
+    }
+    if (step == 20U) {
+        board_writes(1, EARLY + 1, "{\"event\":\"hello\"}");
+    }
+}
+
 void client_receives(void) {
     const ssize_t length = recv(client_fd, received, sizeof received - 1U, MSG_DONTWAIT);
     received[(length > 0) ? length : 0] = '\0';

@@ -38,6 +38,12 @@ void connect_to(const char *path);
 void client_connects(void);
 void client_writes(const char *line);
 void client_receives(void);
+void client_closes(void);
+
+/// For scripts: the board links at step 2, and again once a second.
+void begin_with_the_board(void);
+/// The same, and the board welcomes the client of step 10.
+void begin_with_a_client(void);
 
 /// A client beyond the maximum, or another one.
 void guest_sends(const char *line);

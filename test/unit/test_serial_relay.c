@@ -2,40 +2,33 @@
 // The complete loop of the relay with a simulated board.
 #include "relay_rig.h"
 
+#include "unit.h"
+
 #include <fcntl.h>
 #include <signal.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
-#include <sys/socket.h>
 #include <unistd.h>
 
 #define LATE 900000
 
 /// The client disconnects while the line is full, before its `open` could be written.
 static bool client_goes_before_open(void) {
-    switch (step) {
-    case 2:
-        board_links(EARLY);
-        break;
-    case 10:
+    begin_with_the_board();
+    if (step == 10U) {
         port_is_full = true;
         client_connects();
-        break;
-    case 20:
-        (void)close(client_fd);
-        client_fd = -1;
-        break;
-    case 30:
+    }
+    if (step == 20U) {
+        client_closes();
+    }
+    if (step == 30U) {
         port_is_full = false;
-        break;
-    default:
-        break;
     }
     return step == 500U;
 }
 
-static void test_relay_client_disconnected_before_open_leaves_none_open(void) {
+TEST(test_relay_client_disconnected_before_open_leaves_none_open) {
     run(client_goes_before_open);
     // A line that the port has partly accepted may still be sent. No channel may stay open.
     TEST_ASSERT_LESS_OR_EQUAL_UINT(1, written("\"cmd\":\"open\""));
@@ -46,33 +39,21 @@ static void test_relay_client_disconnected_before_open_leaves_none_open(void) {
 
 /// A client disconnects, and the next one connects before the line accepts a byte.
 static bool client_follows_another(void) {
-    switch (step) {
-    case 2:
-        board_links(EARLY);
-        break;
-    case 10:
-        client_connects();
-        break;
-    case 20:
-        board_writes(1, EARLY + 1, "{\"event\":\"hello\"}");
-        break;
-    case 30:
+    begin_with_a_client();
+    if (step == 30U) {
         port_is_full = true;
-        (void)close(client_fd);
-        break;
-    case 40:
+        client_closes();
+    }
+    if (step == 40U) {
         client_connects();
-        break;
-    case 50:
+    }
+    if (step == 50U) {
         port_is_full = false;
-        break;
-    default:
-        break;
     }
     return step == 150U;
 }
 
-static void test_relay_closes_a_channel_before_it_opens_the_next(void) {
+TEST(test_relay_closes_a_channel_before_it_opens_the_next) {
     run(client_follows_another);
     TEST_ASSERT_EQUAL_UINT(2, written("\"cmd\":\"open\""));
     const char *close_at = strstr(to_board, "\"cmd\":\"close\",\"channel\":1");
@@ -82,33 +63,21 @@ static void test_relay_closes_a_channel_before_it_opens_the_next(void) {
 
 /// One wake-up brings a newer stamp of the board and a command that was sent before it.
 static bool stamp_and_command_together(void) {
-    switch (step) {
-    case 2:
-        board_links(EARLY);
-        break;
-    case 10:
-        client_connects();
-        break;
-    case 20:
-        board_writes(1, EARLY + 1, "{\"event\":\"hello\"}");
-        break;
-    case 30:
+    begin_with_a_client();
+    if (step == 30U) {
         client_writes("{\"cmd\":\"arm\",\"id\":1}\n");
-        break;
-    case 40:
+    }
+    if (step == 40U) {
         board_writes(1, EARLY + 2, "{\"id\":1,\"ok\":true}");
-        break;
-    case 100:
+    }
+    if (step == 100U) {
         client_writes("{\"cmd\":\"drive\",\"left_mm_s\":1,\"right_mm_s\":1}\n");
         board_links(LATE);
-        break;
-    default:
-        break;
     }
     return step == 150U;
 }
 
-static void test_relay_command_quotes_the_stamp_before_its_wake_up(void) {
+TEST(test_relay_command_quotes_the_stamp_before_its_wake_up) {
     char early[32];
     char late[32];
     run(stamp_and_command_together);
@@ -131,35 +100,29 @@ static bool relay_stands_still(void) {
     return step == 150U;
 }
 
-static void test_relay_arm_during_a_stall_is_not_sent(void) {
+TEST(test_relay_arm_during_a_stall_is_not_sent) {
     run(relay_stands_still);
     TEST_ASSERT_EQUAL_UINT_MESSAGE(0, written("\"cmd\":\"arm\""), to_board);
 }
 
 static bool watcher_commands(void) {
-    switch (step) {
-    case 2:
-        board_links(EARLY);
-        break;
-    case 10:
+    begin_with_the_board();
+    if (step == 10U) {
         connect_to(settings.northbound.watch_socket);
-        break;
-    case 20:
+    }
+    if (step == 20U) {
         board_writes(1, EARLY + 1, "{\"event\":\"hello\"}");
-        break;
-    case 30:
+    }
+    if (step == 30U) {
         client_writes("{\"cmd\":\"arm\",\"id\":1}\n");
-        break;
-    case 60:
+    }
+    if (step == 60U) {
         client_writes("{\"cmd\":\"stop\",\"id\":2}\n");
-        break;
-    default:
-        break;
     }
     return step == 100U;
 }
 
-static void test_relay_watcher_may_stop_and_not_arm(void) {
+TEST(test_relay_watcher_may_stop_and_not_arm) {
     settings.northbound.watch_mode = 0600;
     settings.northbound.watch_group[0] = '\0';
     (void)snprintf(settings.northbound.watch_socket, sizeof settings.northbound.watch_socket, "%s/watch", folder);
@@ -170,30 +133,23 @@ static void test_relay_watcher_may_stop_and_not_arm(void) {
 
 /// An event for the previous client arrives on the channel before the hello.
 static bool event_before_hello(void) {
-    switch (step) {
-    case 2:
-        board_links(EARLY);
-        break;
-    case 10:
+    begin_with_the_board();
+    if (step == 10U) {
         client_connects();
-        break;
-    case 20:
+    }
+    if (step == 20U) {
         board_writes(1, EARLY + 1, "{\"event\":\"lease\",\"holder\":7}");
-        break;
-    case 30:
+    }
+    if (step == 30U) {
         board_writes(1, EARLY + 2, "{\"event\":\"hello\"}");
-        break;
-    case 150:
-        (void)recv(client_fd, received, sizeof received - 1U, MSG_DONTWAIT);
-        break;
-    default:
-        break;
+    }
+    if (step == 150U) {
+        client_receives();
     }
     return step == 150U;
 }
 
-static void test_relay_event_before_hello_is_dropped(void) {
-    memset(received, 0, sizeof received);
+TEST(test_relay_event_before_hello_is_dropped) {
     run(event_before_hello);
     TEST_ASSERT_EQUAL_STRING("{\"event\":\"hello\"}\n", received);
     TEST_ASSERT_GREATER_OR_EQUAL_UINT_MESSAGE(1, written("\"cmd\":\"alive\""), to_board);
@@ -201,27 +157,21 @@ static void test_relay_event_before_hello_is_dropped(void) {
 
 /// The greeting of the previous client arrives before the open of this one could be written.
 static bool hello_before_open(void) {
-    switch (step) {
-    case 2:
-        board_links(EARLY);
-        break;
-    case 10:
+    begin_with_the_board();
+    if (step == 10U) {
         relay.free_us = now_us + 50000U;
         client_connects();
-        break;
-    case 20:
+    }
+    if (step == 20U) {
         board_writes(1, EARLY + 1, "{\"event\":\"hello\"}");
-        break;
-    case 30:
+    }
+    if (step == 30U) {
         client_receives();
-        break;
-    default:
-        break;
     }
     return step == 40U;
 }
 
-static void test_relay_hello_before_open_is_dropped(void) {
+TEST(test_relay_hello_before_open_is_dropped) {
     run(hello_before_open);
     TEST_ASSERT_EQUAL_STRING("", received);
 }
@@ -240,18 +190,16 @@ static bool board_restarts(void) {
     return (step < 40U) ? event_before_hello() : step == 50U;
 }
 
-static void test_relay_client_is_closed_by_a_restart_of_the_board(void) {
+TEST(test_relay_client_is_closed_by_a_restart_of_the_board) {
     run(board_restarts);
 }
 
 static bool board_comes(void) {
-    if (step == 2U) {
-        board_links(EARLY);
-    }
+    begin_with_the_board();
     return step == 20U;
 }
 
-static void test_relay_log_without_a_reader_does_not_end_the_relay(void) {
+TEST(test_relay_log_without_a_reader_does_not_end_the_relay) {
     const int saved = dup(STDERR_FILENO);
     int ends[2];
     TEST_ASSERT_EQUAL_INT(0, pipe(ends));
@@ -267,48 +215,34 @@ static void test_relay_log_without_a_reader_does_not_end_the_relay(void) {
 
 /// The only place is in use, and a stop arrives on another connection.
 static bool stop_beyond_the_places(void) {
-    switch (step) {
-    case 2:
-        board_links(EARLY);
-        break;
-    case 10:
-        client_connects();
-        break;
-    case 20:
-        board_writes(1, EARLY + 1, "{\"event\":\"hello\"}");
-        break;
-    case 30:
+    begin_with_a_client();
+    if (step == 30U) {
         guest_sends("{\"cmd\":\"stop\",\"id\":\"guest\"}\n");
-        break;
-    case 40:
+    }
+    if (step == 40U) {
         TEST_ASSERT_EQUAL_UINT_MESSAGE(1, written("\"cmd\":\"stop\""), to_board);
         board_writes(1, EARLY + 2, "{\"id\":1,\"ok\":true,\"state\":\"stopping\"}");
-        break;
-    case 60:
+    }
+    if (step == 60U) {
         guest_reads();
         TEST_ASSERT_NOT_NULL_MESSAGE(strstr(guest_got, "{\"id\":\"guest\",\"ok\":true,\"state\":\"stopping\"}"),
                                      guest_got);
         guest_sends("{\"cmd\":\"reset\",\"id\":\"guest\"}\n");
-        break;
-    case 80:
+    }
+    if (step == 80U) {
         guest_reads();
         TEST_ASSERT_NOT_NULL_MESSAGE(strstr(guest_got, "too_many_clients"), guest_got);
-        break;
-    default:
-        break;
     }
     return step == 350U;
 }
 
-static void test_stop_never_refused_by_a_relay_without_a_place(void) {
+TEST(test_stop_never_refused_by_a_relay_without_a_place) {
     settings.northbound.max_clients = 1;
     run(stop_beyond_the_places);
     TEST_ASSERT_EQUAL_UINT_MESSAGE(1, written("\"cmd\":\"open\""), to_board);
     TEST_ASSERT_EQUAL_UINT_MESSAGE(0, written("\"cmd\":\"reset\""), to_board);
-    char text[512];
-    const ssize_t length = recv(client_fd, text, sizeof text - 1U, MSG_DONTWAIT);
-    text[(length > 0) ? length : 0] = '\0';
-    TEST_ASSERT_NULL_MESSAGE(strstr(text, "\"ok\""), text); // The guest has requested nothing.
+    client_receives();
+    TEST_ASSERT_NULL_MESSAGE(strstr(received, "\"ok\""), received); // The guest has requested nothing.
 }
 
 static char complaints[4096]; // Captured log.
@@ -340,10 +274,8 @@ static void assert_reported_at(unsigned at, const char *words) {
         client_connects();
     }
     if (step == at + 20U) {
-        memset(received, 0, sizeof received);
-        (void)recv(client_fd, received, sizeof received - 1U, MSG_DONTWAIT);
-        (void)close(client_fd);
-        client_fd = -1;
+        client_receives();
+        client_closes();
         TEST_ASSERT_NOT_NULL_MESSAGE(strstr(received, words), received);
     }
 }
@@ -366,7 +298,7 @@ static bool noise_after_nothing(void) {
     return step == 9000U;
 }
 
-static void test_relay_reason_follows_the_received_bytes(void) {
+TEST(test_relay_reason_follows_the_received_bytes) {
     run_logged(noise_after_nothing);
     TEST_ASSERT_EQUAL_UINT_MESSAGE(1, logged("warning: nothing comes"), complaints);
     TEST_ASSERT_EQUAL_UINT_MESSAGE(1, logged("warning: 760 bytes came"), complaints);
@@ -379,7 +311,7 @@ static bool port_stays_away(void) {
     return step == 4100U;
 }
 
-static void test_relay_missing_port_is_not_reported_as_no_bytes(void) {
+TEST(test_relay_missing_port_is_not_reported_as_no_bytes) {
     port_is_missing = true;
     run_logged(port_stays_away);
     TEST_ASSERT_EQUAL_UINT_MESSAGE(1, logged("warning: port: plug the board in"), complaints);
@@ -398,7 +330,7 @@ static bool board_restarts_late(void) {
     return step == 7600U;
 }
 
-static void test_relay_board_restarted_late_is_reported_as_no_bytes(void) {
+TEST(test_relay_board_restarted_late_is_reported_as_no_bytes) {
     run_logged(board_restarts_late);
     TEST_ASSERT_EQUAL_UINT_MESSAGE(1, logged("warning: nothing comes"), complaints);
 }
@@ -410,26 +342,7 @@ static bool board_goes(void) {
     return step == 7000U;
 }
 
-static void test_relay_board_offline_is_logged_each_time(void) {
+TEST(test_relay_board_offline_is_logged_each_time) {
     run_logged(board_goes);
     TEST_ASSERT_EQUAL_UINT_MESSAGE(2, logged("warning: nothing comes"), complaints);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_relay_client_disconnected_before_open_leaves_none_open);
-    RUN_TEST(test_relay_closes_a_channel_before_it_opens_the_next);
-    RUN_TEST(test_relay_command_quotes_the_stamp_before_its_wake_up);
-    RUN_TEST(test_relay_arm_during_a_stall_is_not_sent);
-    RUN_TEST(test_relay_watcher_may_stop_and_not_arm);
-    RUN_TEST(test_relay_event_before_hello_is_dropped);
-    RUN_TEST(test_relay_hello_before_open_is_dropped);
-    RUN_TEST(test_relay_client_is_closed_by_a_restart_of_the_board);
-    RUN_TEST(test_relay_log_without_a_reader_does_not_end_the_relay);
-    RUN_TEST(test_stop_never_refused_by_a_relay_without_a_place);
-    RUN_TEST(test_relay_reason_follows_the_received_bytes);
-    RUN_TEST(test_relay_missing_port_is_not_reported_as_no_bytes);
-    RUN_TEST(test_relay_board_restarted_late_is_reported_as_no_bytes);
-    RUN_TEST(test_relay_board_offline_is_logged_each_time);
-    return UNITY_END();
 }

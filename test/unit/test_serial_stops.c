@@ -9,7 +9,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
-#include <unistd.h>
 
 static const char *last_line; ///< Line of the client directly before it closes.
 static bool line_is_busy;
@@ -20,27 +19,6 @@ static bool refused_before; ///< Its arm was refused before.
 #define FOUR                                                                                                           \
     "{\"cmd\":\"status\",\"id\":1}\n{\"cmd\":\"status\",\"id\":2}\n{\"cmd\":\"status\",\"id\":3}\n"                    \
     "{\"cmd\":\"status\",\"id\":4}\n"
-
-/// The board links at step 2, and welcomes the client of step 10.
-static void begin_with_a_client(void) {
-    if (step == 2U) {
-        board_links(EARLY);
-    }
-    if (step == 10U) {
-        client_connects();
-    }
-    if (step == 20U) {
-        board_writes(1, EARLY + 1, "{\"event\":\"hello\"}");
-    }
-    if (step % 1000U == 999U) {
-        board_links(EARLY + step);
-    }
-}
-
-static void client_closes(void) {
-    (void)close(client_fd);
-    client_fd = -1;
-}
 
 /// Answers the last request with this text on the line.
 static void board_answers(uint8_t channel, const char *words, const char *rest) {
@@ -80,17 +58,17 @@ static bool stop_and_close(void) {
     return step == 200U;
 }
 
-static void assert_stop_before_close(const char *words) {
+/// The client sends this line and closes: the stop in it is sent before the channel is closed.
+static void assert_stop_before_close(const char *line, const char *words) {
+    last_line = line;
+    run(stop_and_close);
     const char *stop = strstr(to_board, words);
     TEST_ASSERT_NOT_NULL_MESSAGE(stop, to_board);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(stop, "\"cmd\":\"close\",\"channel\":1"), to_board);
 }
 
 TEST(test_relay_stop_directly_before_closing_is_sent) {
-    last_line = STOP;
-    run(stop_and_close);
-    line_is_busy = refused_before = false;
-    assert_stop_before_close("\"stop\"");
+    assert_stop_before_close(STOP, "\"stop\"");
 }
 
 /// Noise or another program has left a part of a line in the board's receiver, or the board has lost bytes of it.
@@ -124,27 +102,20 @@ TEST(test_relay_stop_after_an_incomplete_line_is_received) {
 }
 
 TEST(test_relay_stop_before_closing_is_sent_after_a_refused_arm) {
-    last_line = ESTOP;
     refused_before = true;
-    run(stop_and_close);
-    line_is_busy = refused_before = false;
-    assert_stop_before_close("\"estop\"");
+    assert_stop_before_close(ESTOP, "\"estop\"");
+    refused_before = false;
 }
 
 TEST(test_relay_stop_before_closing_is_sent_over_a_busy_line) {
-    last_line = STOP;
     line_is_busy = true;
-    run(stop_and_close);
-    line_is_busy = refused_before = false;
-    assert_stop_before_close("\"stop\"");
+    assert_stop_before_close(STOP, "\"stop\"");
+    line_is_busy = false;
 }
 
 /// The client closes in the same moment, behind four questions without a reply.
 TEST(test_relay_stop_before_closing_is_sent_behind_questions) {
-    last_line = FOUR FOUR STOP;
-    run(stop_and_close);
-    line_is_busy = refused_before = false;
-    assert_stop_before_close("\"stop\"");
+    assert_stop_before_close(FOUR FOUR STOP, "\"stop\"");
 }
 
 #define STATUS(id) "{\"cmd\":\"status\",\"id\":" id "}\n"
@@ -152,20 +123,16 @@ TEST(test_relay_stop_before_closing_is_sent_behind_questions) {
 /// A stop behind questions without a reply. An arm before it is in the queue, another one not yet.
 static bool questions_then_stop(void) {
     begin_with_a_client();
-    switch (step) {
-    case 30:
+    if (step == 30U) {
         client_writes(STATUS("1") STATUS("2") "{\"cmd\":\"arm\",\"id\":3}\n" STATUS("4"));
         client_writes("{\"cmd\":\"arm\",\"id\":5}\n" STATUS("6") STATUS("7") STATUS("8") STATUS("9"));
-        break;
-    case 50:
+    }
+    if (step == 50U) {
         client_writes("{\"cmd\":\"stop\",\"id\":10}\n" STATUS("11"));
-        break;
-    case 51:
+    }
+    if (step == 51U) {
         TEST_ASSERT_EQUAL_UINT_MESSAGE(1, written("\"stop\""), to_board);
         board_answers(1, "\"stop\"", "true,\"state\":\"stopping\"");
-        break;
-    default:
-        break;
     }
     if (step >= 60U && step % 10U == 0U && step <= 130U) {
         board_answers(1, "\"status\"", "true");
@@ -237,9 +204,7 @@ TEST(test_relay_stop_before_the_welcome_uses_another_channel) {
 
 /// The only client closes before its welcome.
 static bool stop_without_a_welcome(void) {
-    if (step == 2U) {
-        board_links(EARLY);
-    }
+    begin_with_the_board();
     if (step == 10U) {
         client_connects();
         client_writes(STOP);
@@ -364,7 +329,6 @@ TEST(test_relay_client_that_ends_after_a_stop_receives_its_reply) {
 TEST(test_relay_equal_stops_are_sent_once_and_answered_each) {
     last_line = STOP STOP;
     run(stop_and_end);
-    refused_before = false;
     TEST_ASSERT_EQUAL_UINT_MESSAGE(1, written("\"stop\""), to_board);
     TEST_ASSERT_EQUAL_UINT_MESSAGE(2, count_in(received, "{\"id\":9,\"ok\":true}\n"), received);
 }
