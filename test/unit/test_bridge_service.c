@@ -2,19 +2,17 @@
 // Signal handling that all bridges share, and a log without a reader.
 #include "common/bridge_service.h"
 
-#include "unity.h"
+#include "unit.h"
 
-#include <poll.h>
 #include <signal.h>
-#include <stdio.h>
-#include <string.h>
 #include <unistd.h>
 
-void setUp(void) {}
+void setUp(void) {
+    (void)signal(SIGPIPE, SIG_DFL);
+    bridge_service_take_signals();
+}
 
-void tearDown(void) {}
-
-static void test_service_write_to_closed_log_returns_error(void) {
+TEST(test_service_write_to_closed_log_returns_error) {
     static const char words[] = "iwheel: a line\n";
     const int saved = dup(STDERR_FILENO);
     int ends[2];
@@ -28,18 +26,9 @@ static void test_service_write_to_closed_log_returns_error(void) {
     TEST_ASSERT_EQUAL_INT(-1, count);
 }
 
-static void test_service_signal_ends_the_current_and_next_wait(void) {
+TEST(test_service_signal_ends_the_current_and_next_wait) {
     TEST_ASSERT_TRUE(bridge_service_wait(NULL, 0, 0));
     (void)raise(SIGTERM); // The signal is blocked until the wait.
     TEST_ASSERT_FALSE(bridge_service_wait(NULL, 0, 10000));
     TEST_ASSERT_FALSE(bridge_service_wait(NULL, 0, -1));
-}
-
-int main(void) {
-    (void)signal(SIGPIPE, SIG_DFL);
-    bridge_service_take_signals();
-    UNITY_BEGIN();
-    RUN_TEST(test_service_write_to_closed_log_returns_error);
-    RUN_TEST(test_service_signal_ends_the_current_and_next_wait);
-    return UNITY_END();
 }

@@ -2,23 +2,22 @@
 // iwc_find: search for the only gateway.
 #include "iwheel_client/client.h"
 
+#include "folder.h"
 #include "unit.h"
 
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
 #include <unistd.h>
 
-static char directory[] = "/tmp/iwheel-find-XXXXXX";
 static char out[256];
 
 static int bind_socket(const char *name) {
     struct sockaddr_un address = {.sun_family = AF_UNIX};
     const int one = socket(AF_UNIX, SOCK_STREAM, 0);
-    (void)snprintf(address.sun_path, sizeof address.sun_path, "%s/%s", directory, name);
+    (void)snprintf(address.sun_path, sizeof address.sun_path, "%s", in_folder(name));
     TEST_ASSERT_EQUAL_INT(0, bind(one, (const struct sockaddr *)&address, sizeof address));
     return one;
 }
@@ -38,27 +37,22 @@ static void add_live(const char *name) {
 }
 
 static void add_file(const char *name) {
-    char path[128];
-    (void)snprintf(path, sizeof path, "%s/%s", directory, name);
-    FILE *file = fopen(path, "w");
+    FILE *file = fopen(in_folder(name), "w");
     TEST_ASSERT_NOT_NULL(file);
     (void)fclose(file);
 }
 
 void setUp(void) {
-    memcpy(strrchr(directory, '-'), "-XXXXXX", 8);
-    TEST_ASSERT_NOT_NULL(mkdtemp(directory));
+    folder_make();
     memset(out, 'x', sizeof out - 1U);
 }
 
 void tearDown(void) {
-    char command[128];
     while (listening > 0) {
         listening--;
         (void)close(listeners[listening]);
     }
-    (void)snprintf(command, sizeof command, "rm -r %s", directory);
-    TEST_ASSERT_EQUAL_INT(0, system(command));
+    folder_remove();
 }
 
 TEST(test_find_missing_directory_is_none) {
@@ -70,22 +64,20 @@ TEST(test_find_only_sockets_with_the_suffix_count) {
     add_file("gateway.sock");
     add_socket("control");
     add_socket(".sock");
-    TEST_ASSERT_EQUAL(IWC_NOT_THERE, iwc_find(directory, out, sizeof out));
+    TEST_ASSERT_EQUAL(IWC_NOT_THERE, iwc_find(folder, out, sizeof out));
 }
 
 TEST(test_find_only_gateway_is_returned) {
-    char path[128];
     add_file("gateway.lock");
     add_socket("can0.sock");
-    (void)snprintf(path, sizeof path, "%s/can0.sock", directory);
-    TEST_ASSERT_EQUAL(IWC_OK, iwc_find(directory, out, sizeof out));
-    TEST_ASSERT_EQUAL_STRING(path, out);
+    TEST_ASSERT_EQUAL(IWC_OK, iwc_find(folder, out, sizeof out));
+    TEST_ASSERT_EQUAL_STRING(in_folder("can0.sock"), out);
 }
 
 TEST(test_find_several_gateways_are_listed) {
     add_live("can0.sock");
     add_live("can1.sock");
-    TEST_ASSERT_EQUAL(IWC_SEVERAL, iwc_find(directory, out, sizeof out));
+    TEST_ASSERT_EQUAL(IWC_SEVERAL, iwc_find(folder, out, sizeof out));
     TEST_ASSERT_NOT_NULL(strstr(out, "/can0.sock"));
     TEST_ASSERT_NOT_NULL(strstr(out, "/can1.sock"));
 }
@@ -94,30 +86,24 @@ TEST(test_find_list_that_does_not_fit_is_cut_between_paths) {
     char little[48];
     add_live("can0.sock");
     add_live("can1.sock");
-    TEST_ASSERT_EQUAL(IWC_SEVERAL, iwc_find(directory, little, sizeof little));
+    TEST_ASSERT_EQUAL(IWC_SEVERAL, iwc_find(folder, little, sizeof little));
     TEST_ASSERT_EQUAL_STRING(".sock", little + strlen(little) - 5U);
-}
-
-static const char *path_of(const char *name) {
-    static char path[128];
-    (void)snprintf(path, sizeof path, "%s/%s", directory, name);
-    return path;
 }
 
 /// Adds both sockets of a gateway. Only the owner may use the socket for driving.
 static void add_pair(void) {
-    TEST_ASSERT_EQUAL_INT(0, mkdir(path_of("watch"), 0755));
-    TEST_ASSERT_EQUAL_INT(0, chmod(directory, 0755));
+    TEST_ASSERT_EQUAL_INT(0, mkdir(in_folder("watch"), 0755));
+    TEST_ASSERT_EQUAL_INT(0, chmod(folder, 0755));
     add_socket("can0.sock");
-    TEST_ASSERT_EQUAL_INT(0, chmod(path_of("can0.sock"), 0600));
+    TEST_ASSERT_EQUAL_INT(0, chmod(in_folder("can0.sock"), 0600));
     add_socket("watch/can0.sock");
-    TEST_ASSERT_EQUAL_INT(0, chmod(path_of("watch/can0.sock"), 0666));
+    TEST_ASSERT_EQUAL_INT(0, chmod(in_folder("watch/can0.sock"), 0666));
 }
 
 TEST(test_find_two_sockets_of_one_gateway_returns_drive_socket) {
     add_pair();
-    TEST_ASSERT_EQUAL(IWC_OK, iwc_find(directory, out, sizeof out));
-    TEST_ASSERT_EQUAL_STRING(path_of("can0.sock"), out);
+    TEST_ASSERT_EQUAL(IWC_OK, iwc_find(folder, out, sizeof out));
+    TEST_ASSERT_EQUAL_STRING(in_folder("can0.sock"), out);
 }
 
 TEST(test_find_without_right_to_drive_returns_watch_socket) {
@@ -126,10 +112,10 @@ TEST(test_find_without_right_to_drive_returns_watch_socket) {
     }
     add_pair();
     TEST_ASSERT_EQUAL_INT(0, seteuid(65534));
-    const iwc_result_t result = iwc_find(directory, out, sizeof out);
+    const iwc_result_t result = iwc_find(folder, out, sizeof out);
     TEST_ASSERT_EQUAL_INT(0, seteuid(0));
     TEST_ASSERT_EQUAL(IWC_OK, result);
-    TEST_ASSERT_EQUAL_STRING(path_of("watch/can0.sock"), out);
+    TEST_ASSERT_EQUAL_STRING(in_folder("watch/can0.sock"), out);
 }
 
 TEST(test_find_without_any_right_returns_drive_socket) {
@@ -137,35 +123,35 @@ TEST(test_find_without_any_right_returns_drive_socket) {
         TEST_IGNORE_MESSAGE("needs root to change the user");
     }
     add_pair();
-    TEST_ASSERT_EQUAL_INT(0, chmod(path_of("watch/can0.sock"), 0600));
+    TEST_ASSERT_EQUAL_INT(0, chmod(in_folder("watch/can0.sock"), 0600));
     TEST_ASSERT_EQUAL_INT(0, seteuid(65534));
-    const iwc_result_t result = iwc_find(directory, out, sizeof out);
+    const iwc_result_t result = iwc_find(folder, out, sizeof out);
     TEST_ASSERT_EQUAL_INT(0, seteuid(0));
     TEST_ASSERT_EQUAL(IWC_OK, result);
-    TEST_ASSERT_EQUAL_STRING(path_of("can0.sock"), out);
+    TEST_ASSERT_EQUAL_STRING(in_folder("can0.sock"), out);
 }
 
 TEST(test_find_watch_socket_alone_counts_as_a_gateway) {
     add_pair();
-    TEST_ASSERT_EQUAL_INT(0, unlink(path_of("can0.sock")));
-    TEST_ASSERT_EQUAL(IWC_OK, iwc_find(directory, out, sizeof out));
-    TEST_ASSERT_EQUAL_STRING(path_of("watch/can0.sock"), out);
-    TEST_ASSERT_EQUAL_INT(0, unlink(path_of("watch/can0.sock")));
+    TEST_ASSERT_EQUAL_INT(0, unlink(in_folder("can0.sock")));
+    TEST_ASSERT_EQUAL(IWC_OK, iwc_find(folder, out, sizeof out));
+    TEST_ASSERT_EQUAL_STRING(in_folder("watch/can0.sock"), out);
+    TEST_ASSERT_EQUAL_INT(0, unlink(in_folder("watch/can0.sock")));
     add_live("watch/can0.sock");
     add_live("can1.sock");
-    TEST_ASSERT_EQUAL(IWC_SEVERAL, iwc_find(directory, out, sizeof out));
+    TEST_ASSERT_EQUAL(IWC_SEVERAL, iwc_find(folder, out, sizeof out));
 }
 
 TEST(test_find_file_without_listener_is_no_second_gateway) {
     add_socket("a.sock");
     add_socket("z.sock");
-    TEST_ASSERT_EQUAL(IWC_OK, iwc_find(directory, out, sizeof out)); // None listens: the first file, for the error.
+    TEST_ASSERT_EQUAL(IWC_OK, iwc_find(folder, out, sizeof out)); // None listens: the first file, for the error.
     TEST_ASSERT_EQUAL_STRING(".sock", out + strlen(out) - 5U);
-    TEST_ASSERT_EQUAL(strlen(directory) + strlen("/a.sock"), strlen(out));
+    TEST_ASSERT_EQUAL(strlen(folder) + strlen("/a.sock"), strlen(out));
     add_live("can0.sock");
-    TEST_ASSERT_EQUAL(IWC_OK, iwc_find(directory, out, sizeof out));
-    TEST_ASSERT_EQUAL_STRING(path_of("can0.sock"), out);
+    TEST_ASSERT_EQUAL(IWC_OK, iwc_find(folder, out, sizeof out));
+    TEST_ASSERT_EQUAL_STRING(in_folder("can0.sock"), out);
     add_live("can1.sock");
-    TEST_ASSERT_EQUAL(IWC_SEVERAL, iwc_find(directory, out, sizeof out));
+    TEST_ASSERT_EQUAL(IWC_SEVERAL, iwc_find(folder, out, sizeof out));
     TEST_ASSERT_NULL(strstr(out, "/a.sock"));
 }

@@ -2,7 +2,8 @@
 // libiwheel-client: optional members of a request, and stops through either socket of a gateway.
 #include "iwheel_client/client.h"
 
-#include "unity.h"
+#include "folder.h"
+#include "unit.h"
 
 #include <sched.h>
 #include <signal.h>
@@ -24,7 +25,6 @@
 
 static iwc_t *gateway;
 static int server;
-static char folder[] = "/tmp/client_stop_XXXXXX";
 static char drive_path[64];
 static char watch_path[64];
 
@@ -51,6 +51,8 @@ static void adopt(void) {
 void setUp(void) {
     gateway = iwc_new();
     server = -1;
+    folder_make();
+    TEST_ASSERT_EQUAL_INT(0, mkdir(in_folder("watch"), 0755));
     (void)snprintf(drive_path, sizeof drive_path, "%s/gateway.sock", folder);
     (void)snprintf(watch_path, sizeof watch_path, "%s/watch/gateway.sock", folder);
 }
@@ -60,13 +62,12 @@ void tearDown(void) {
     if (server >= 0) {
         (void)close(server);
     }
-    (void)unlink(drive_path);
-    (void)unlink(watch_path);
+    folder_remove();
 }
 
 // A place for stops ---------------------------------------------------------------------------------------------------
 
-static void test_adopted_for_stop_needs_no_greeting(void) {
+TEST(test_adopted_for_stop_needs_no_greeting) {
     int pair[2];
     iwc_message_t message;
     TEST_ASSERT_EQUAL_INT(0, socketpair(AF_UNIX, SOCK_STREAM, 0, pair));
@@ -82,7 +83,7 @@ static void test_adopted_for_stop_needs_no_greeting(void) {
 
 // Optional members of a request ---------------------------------------------------------------------------------------
 
-static void test_ask_helpers_send_time_stop_and_key(void) {
+TEST(test_ask_helpers_send_time_stop_and_key) {
     adopt();
     const iwc_drive_t drive = {.left_mm_s = 1, .right_mm_s = 2};
     const iwc_twist_t twist = {.v_mm_s = 5, .yaw_mrad_s = -6};
@@ -111,7 +112,7 @@ static void expect_estop(int id, const char *reason, const char *sent) {
     TEST_ASSERT_EQUAL_STRING(text, receive());
 }
 
-static void test_stop_never_refused_by_the_client_for_its_reason(void) {
+TEST(test_stop_never_refused_by_the_client_for_its_reason) {
     char reason[5001];
     char sent[300];
     adopt();
@@ -130,7 +131,7 @@ static void test_stop_never_refused_by_the_client_for_its_reason(void) {
     expect_estop(16, reason, sent);
 }
 
-static void test_ask_arm_returns_the_key_of_the_lease(void) {
+TEST(test_ask_arm_returns_the_key_of_the_lease) {
     adopt();
     char key[IWC_KEY_SIZE] = "before";
     send_text("{\"id\":2,\"ok\":true,\"lease_ms\":200,\"key\":\"0123456789abcdef0123456789abcdef\"}\n");
@@ -141,7 +142,7 @@ static void test_ask_arm_returns_the_key_of_the_lease(void) {
     TEST_ASSERT_EQUAL_STRING("", key);
 }
 
-static void test_reason_without_connection_is_not_empty(void) {
+TEST(test_reason_without_connection_is_not_empty) {
     TEST_ASSERT_EQUAL_STRING(iwc_words(IWC_CLOSED), iwc_reason(gateway));
     TEST_ASSERT_GREATER_THAN(3, strlen(iwc_reason(NULL)));
 }
@@ -208,7 +209,7 @@ static bool reply_has(const char *state) {
     return iwc_reply(gateway, &reply) && iwc_is(&reply, "state", state);
 }
 
-static void test_stop_at_sends_its_line_without_a_greeting(void) {
+TEST(test_stop_at_sends_its_line_without_a_greeting) {
     const pid_t child = serve(drive_path, replies("stopping"));
     TEST_ASSERT_EQUAL(IWC_OK, iwc_stop_at(gateway, drive_path, LONG));
     TEST_ASSERT_TRUE(reply_has("stopping"));
@@ -216,7 +217,7 @@ static void test_stop_at_sends_its_line_without_a_greeting(void) {
     end(child);
 }
 
-static void test_stop_at_missing_socket_uses_the_other_one(void) {
+TEST(test_stop_at_missing_socket_uses_the_other_one) {
     pid_t child = serve(watch_path, replies("latched"));
     TEST_ASSERT_EQUAL(IWC_OK, iwc_estop_at(gateway, drive_path, "stairs\n\xFC", LONG));
     end(child);
@@ -226,7 +227,7 @@ static void test_stop_at_missing_socket_uses_the_other_one(void) {
     end(child);
 }
 
-static void test_stop_at_full_socket_uses_the_other_one(void) {
+TEST(test_stop_at_full_socket_uses_the_other_one) {
     const pid_t full = serve(drive_path, CROWD);
     const pid_t child = serve(watch_path, replies("stopping"));
     TEST_ASSERT_EQUAL(IWC_OK, iwc_stop_at(gateway, drive_path, LONG));
@@ -235,20 +236,20 @@ static void test_stop_at_full_socket_uses_the_other_one(void) {
     end(child);
 }
 
-static void test_stop_at_full_socket_alone_is_refused(void) {
+TEST(test_stop_at_full_socket_alone_is_refused) {
     const pid_t full = serve(drive_path, CROWD);
     TEST_ASSERT_EQUAL(IWC_REFUSED, iwc_stop_at(gateway, drive_path, 500));
     TEST_ASSERT_EQUAL_STRING("too_many_clients", iwc_error(gateway));
     end(full);
 }
 
-static void test_stop_at_without_gateway_returns_immediately(void) {
+TEST(test_stop_at_without_gateway_returns_immediately) {
     TEST_ASSERT_EQUAL(IWC_NOT_THERE, iwc_stop_at(gateway, drive_path, IWC_FOREVER));
     TEST_ASSERT_EQUAL(IWC_NOT_THERE, iwc_estop_at(gateway, drive_path, "a\nb", LONG));
 }
 
 /// The name space of this process has an empty /run from here on.
-static void test_stop_at_without_a_name_stops_every_gateway(void) {
+TEST(test_stop_at_without_a_name_stops_every_gateway) {
     const char *stopped = replies("stopping");
     if (unshare(CLONE_NEWNS) != 0 || mount(NULL, "/", NULL, MS_REC | MS_PRIVATE, NULL) != 0 ||
         mount("none", "/run", "tmpfs", 0, NULL) != 0) {
@@ -281,26 +282,4 @@ static void test_stop_at_without_a_name_stops_every_gateway(void) {
     TEST_ASSERT_EQUAL(IWC_TIMEOUT, iwc_stop_at(gateway, NULL, SHORT));
     end(hung);
     TEST_ASSERT_EQUAL(IWC_NOT_THERE, iwc_stop_at(gateway, NULL, LONG));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    TEST_ASSERT_NOT_NULL(mkdtemp(folder));
-    char watch[64];
-    (void)snprintf(watch, sizeof watch, "%s/watch", folder);
-    TEST_ASSERT_EQUAL_INT(0, mkdir(watch, 0755));
-    RUN_TEST(test_adopted_for_stop_needs_no_greeting);
-    RUN_TEST(test_ask_helpers_send_time_stop_and_key);
-    RUN_TEST(test_stop_never_refused_by_the_client_for_its_reason);
-    RUN_TEST(test_ask_arm_returns_the_key_of_the_lease);
-    RUN_TEST(test_reason_without_connection_is_not_empty);
-    RUN_TEST(test_stop_at_sends_its_line_without_a_greeting);
-    RUN_TEST(test_stop_at_missing_socket_uses_the_other_one);
-    RUN_TEST(test_stop_at_full_socket_uses_the_other_one);
-    RUN_TEST(test_stop_at_full_socket_alone_is_refused);
-    RUN_TEST(test_stop_at_without_gateway_returns_immediately);
-    RUN_TEST(test_stop_at_without_a_name_stops_every_gateway);
-    (void)rmdir(watch);
-    (void)rmdir(folder);
-    return UNITY_END();
 }

@@ -4,13 +4,13 @@
 #include "disk/file_store.h"
 #include "sockets/owners.h"
 
-#include "unity.h"
+#include "folder.h"
+#include "unit.h"
 
 #include <errno.h>
 #include <fcntl.h>
 #include <poll.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <sys/file.h>
 #include <sys/socket.h>
@@ -20,7 +20,6 @@
 #include <unistd.h>
 
 static size_t length;
-static char folder[] = "/tmp/iwheel-store-XXXXXX";
 static gw_file_store_t store;
 static const char *reply;
 static int error;
@@ -28,12 +27,6 @@ static char second[128];
 static int fsync_error;  ///< Error of fsync in a process that is opened after it is set; 0: none
 static bool fsync_waits; ///< The same: fsync waits until the file "flush" exists
 static bool time_flies;  ///< The same: pauses take no time
-
-static char *in_folder(const char *name) {
-    static char path[128];
-    (void)snprintf(path, sizeof path, "%s/%s", folder, name);
-    return path;
-}
 
 int nanosleep(const struct timespec *pause, struct timespec *left) {
     return time_flies ? 0 : clock_nanosleep(CLOCK_REALTIME, 0, pause, left);
@@ -50,9 +43,13 @@ int fsync(int fd) {
     return (int)syscall(SYS_fsync, fd);
 }
 
-void setUp(void) {}
+void setUp(void) {
+    folder_make();
+}
 
-void tearDown(void) {}
+void tearDown(void) {
+    folder_remove();
+}
 
 static gw_file_store_news_t next_news(void) {
     gw_file_store_news_t news = GW_FILE_STORE_NO_NEWS;
@@ -92,7 +89,7 @@ static void assert_file(const char *name, const char *content) {
     TEST_ASSERT_EQUAL_STRING(content, found);
 }
 
-static void test_file_store_writes_reads_back_and_sets_aside(void) {
+TEST(test_file_store_writes_reads_back_and_sets_aside) {
     open_store(folder, GW_FILE_STORE_ABSENT);
     TEST_ASSERT_TRUE(gw_file_store_write(&store, "one", 3));
     TEST_ASSERT_FALSE_MESSAGE(gw_file_store_write(&store, "two", 3), "one at a time");
@@ -111,7 +108,7 @@ static void test_file_store_writes_reads_back_and_sets_aside(void) {
     gw_file_store_close(&store);
 }
 
-static void test_file_store_without_directory_fails_until_it_exists(void) {
+TEST(test_file_store_without_directory_fails_until_it_exists) {
     char missing[64];
     (void)snprintf(missing, sizeof missing, "%s/later", folder);
     open_store(missing, GW_FILE_STORE_FAILED);
@@ -124,13 +121,10 @@ static void test_file_store_without_directory_fails_until_it_exists(void) {
     TEST_ASSERT_EQUAL_INT(GW_FILE_STORE_WRITTEN, next_news());
     assert_file("later/file", "two");
     gw_file_store_close(&store);
-    (void)unlink(in_folder("later/file"));
-    (void)rmdir(missing);
 }
 
-static void test_file_store_refuses_link_pipe_and_too_large_file(void) {
+TEST(test_file_store_refuses_link_pipe_and_too_large_file) {
     put_file("other", "precious");
-    (void)unlink(in_folder("file"));
     TEST_ASSERT_EQUAL_INT(0, symlink("other", in_folder("file")));
     open_store(folder, GW_FILE_STORE_BAD);
     TEST_ASSERT_TRUE(gw_file_store_write(&store, "new", 3));
@@ -148,10 +142,9 @@ static void test_file_store_refuses_link_pipe_and_too_large_file(void) {
     open_store(folder, GW_FILE_STORE_BAD);
     TEST_ASSERT_EQUAL_INT(EFBIG, error);
     gw_file_store_close(&store);
-    (void)unlink(in_folder("file"));
 }
 
-static void test_file_store_failed_write_retains_the_old_file(void) {
+TEST(test_file_store_failed_write_retains_the_old_file) {
     put_file("file", "old");
     TEST_ASSERT_EQUAL_INT(0, mkdir(in_folder("file.new"), 0755));
     open_store(folder, GW_FILE_STORE_READ);
@@ -159,10 +152,9 @@ static void test_file_store_failed_write_retains_the_old_file(void) {
     TEST_ASSERT_EQUAL_INT(GW_FILE_STORE_FAILED, next_news());
     assert_file("file", "old");
     gw_file_store_close(&store);
-    TEST_ASSERT_EQUAL_INT(0, rmdir(in_folder("file.new")));
 }
 
-static void test_file_store_reports_failed_fsync_and_rename(void) {
+TEST(test_file_store_reports_failed_fsync_and_rename) {
     put_file("file", "old");
     fsync_error = EIO;
     open_store(folder, GW_FILE_STORE_READ);
@@ -180,11 +172,10 @@ static void test_file_store_reports_failed_fsync_and_rename(void) {
     TEST_ASSERT_EQUAL_INT(EISDIR, error);
     TEST_ASSERT_EQUAL_INT(-1, access(in_folder("file.new"), F_OK));
     gw_file_store_close(&store);
-    (void)rmdir(in_folder("file"));
-    put_file("file", "old");
 }
 
-static void test_file_store_never_writes_into_an_existing_file(void) {
+TEST(test_file_store_never_writes_into_an_existing_file) {
+    put_file("file", "old");
     put_file("other", "precious");
     name_again("other", "file.new");
     open_store(folder, GW_FILE_STORE_READ);
@@ -200,7 +191,7 @@ static void test_file_store_never_writes_into_an_existing_file(void) {
 }
 
 /// A gateway that starts while the store process of the earlier one still writes must not begin with the older file.
-static void test_file_store_read_waits_for_a_pending_write(void) {
+TEST(test_file_store_read_waits_for_a_pending_write) {
     put_file("file", "old");
     fsync_waits = true;
     open_store(folder, GW_FILE_STORE_READ);
@@ -217,10 +208,9 @@ static void test_file_store_read_waits_for_a_pending_write(void) {
     TEST_ASSERT_EQUAL_UINT(3, length);
     TEST_ASSERT_EQUAL_MEMORY("new", reply, 3);
     gw_file_store_close(&store);
-    (void)unlink(in_folder("flush"));
 }
 
-static void test_file_store_read_does_not_wait_without_end(void) {
+TEST(test_file_store_read_does_not_wait_without_end) {
     put_file("file", "old");
     const int directory = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     TEST_ASSERT_EQUAL_INT(0, flock(directory, LOCK_EX));
@@ -238,7 +228,7 @@ static void assert_not_read(int why) {
     gw_file_store_close(&store);
 }
 
-static void test_file_store_refuses_file_with_second_name_or_other_owner(void) {
+TEST(test_file_store_refuses_file_with_second_name_or_other_owner) {
     put_file("file", "old");
     name_again("file", "again");
     assert_not_read(SOCK_FOLDER_FILE);
@@ -249,7 +239,6 @@ static void test_file_store_refuses_file_with_second_name_or_other_owner(void) {
     }
     TEST_ASSERT_EQUAL_INT(0, chown(in_folder("file"), 65534, 65534));
     assert_not_read(SOCK_FOLDER_FILE);
-    (void)unlink(in_folder("file"));
 }
 
 static void assert_no_folder(const char *path, int why) {
@@ -261,7 +250,7 @@ static void assert_no_folder(const char *path, int why) {
     gw_file_store_close(&store);
 }
 
-static void test_file_store_refuses_folder_writable_by_others(void) {
+TEST(test_file_store_refuses_folder_writable_by_others) {
     static const mode_t modes[] = {0777, 01777, 0775, 0757};
     for (size_t i = 0; i < sizeof modes / sizeof modes[0]; i++) {
         TEST_ASSERT_EQUAL_INT(0, chmod(folder, modes[i]));
@@ -282,7 +271,7 @@ static void test_file_store_refuses_folder_writable_by_others(void) {
     TEST_ASSERT_EQUAL_INT(0, chown(folder, 0, 0));
 }
 
-static void test_file_store_ended_process_is_reported_once(void) {
+TEST(test_file_store_ended_process_is_reported_once) {
     TEST_ASSERT_EQUAL_INT(0, gw_file_store_open(&store, folder, "file"));
     (void)next_news();
     (void)shutdown(store.child.fd, SHUT_RDWR);
@@ -291,29 +280,4 @@ static void test_file_store_ended_process_is_reported_once(void) {
     gw_file_store_close(&store);
     TEST_ASSERT_FALSE(gw_file_store_write(&store, "new", 3));
     TEST_ASSERT_EQUAL_INT(GW_FILE_STORE_NO_NEWS, gw_file_store_receive(&store, &reply, &length, &error));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    if (mkdtemp(folder) == NULL) {
-        return 1;
-    }
-    RUN_TEST(test_file_store_writes_reads_back_and_sets_aside);
-    RUN_TEST(test_file_store_without_directory_fails_until_it_exists);
-    RUN_TEST(test_file_store_refuses_link_pipe_and_too_large_file);
-    RUN_TEST(test_file_store_failed_write_retains_the_old_file);
-    RUN_TEST(test_file_store_reports_failed_fsync_and_rename);
-    RUN_TEST(test_file_store_never_writes_into_an_existing_file);
-    RUN_TEST(test_file_store_read_waits_for_a_pending_write);
-    RUN_TEST(test_file_store_read_does_not_wait_without_end);
-    RUN_TEST(test_file_store_refuses_file_with_second_name_or_other_owner);
-    RUN_TEST(test_file_store_refuses_folder_writable_by_others);
-    RUN_TEST(test_file_store_ended_process_is_reported_once);
-    (void)unlink(in_folder("file"));
-    (void)unlink(in_folder("file.new"));
-    (void)unlink(in_folder("file.damaged"));
-    (void)unlink(in_folder("other"));
-    (void)unlink(in_folder("flush"));
-    (void)rmdir(folder);
-    return UNITY_END();
 }

@@ -7,10 +7,10 @@
 #include "iwheel_linux/clock.h"
 
 #include "box_end.h"
+#include "folder.h"
 #include "unit.h"
 #include <dirent.h>
 #include <errno.h>
-#include <fcntl.h>
 #include <poll.h>
 #include <signal.h>
 #include <stdio.h>
@@ -25,7 +25,6 @@
 
 static gateway_config_t config;
 static gw_box_t box;
-static char folder[64];
 static bool open_box;
 
 static off_t *synced; ///< Bytes of all files at their last fsync, in memory that the writer process shares.
@@ -42,22 +41,19 @@ int fsync(int fd) {
 
 void setUp(void) {
     gateway_config_default(&config);
-    (void)snprintf(folder, sizeof folder, "/tmp/iwheel-box-XXXXXX");
-    TEST_ASSERT_NOT_NULL(mkdtemp(folder));
+    folder_make();
     (void)snprintf(config.record.directory, sizeof config.record.directory, "%s/records", folder);
     config.record.blackbox_s = 2;
     config.record.keep_stops = 8;
 }
 
 void tearDown(void) {
-    char command[128];
     if (open_box) {
         box_end(&box);
         open_box = false;
     }
     (void)umount2(config.record.directory, MNT_DETACH);
-    (void)snprintf(command, sizeof command, "rm -rf %s /dev/shm/%s", folder, strrchr(folder, '/') + 1);
-    TEST_ASSERT_EQUAL(0, system(command));
+    folder_remove();
 }
 
 /// Opens the box as from a terminal, independent of the parent process.

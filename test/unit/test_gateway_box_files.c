@@ -2,31 +2,27 @@
 // The directory of recordings: rotation, its cost, requested recordings, the reserve. No writer process runs.
 #include "disk/box_files.h"
 
+#include "folder.h"
 #include "unit.h"
 
 #include <dirent.h>
 #include <fcntl.h>
 #include <signal.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-static char folder[64];
 static char records[96];
 
 void setUp(void) {
-    (void)snprintf(folder, sizeof folder, "/tmp/iwheel-files-XXXXXX");
-    TEST_ASSERT_NOT_NULL(mkdtemp(folder));
+    folder_make();
     (void)snprintf(records, sizeof records, "%s/records", folder);
 }
 
 void tearDown(void) {
-    char command[128];
-    (void)snprintf(command, sizeof command, "rm -rf %s /dev/shm/%s", folder, strrchr(folder, '/') + 1);
-    TEST_ASSERT_EQUAL(0, system(command));
+    folder_remove();
 }
 
 static bool is_there(const char *name) {
@@ -61,7 +57,7 @@ static void make_recordings(unsigned first, unsigned last, int speed_mm_s) {
 
 /// Opens a record directory in memory, for tests with many files.
 static int open_in_memory(void) {
-    (void)snprintf(records, sizeof records, "/dev/shm/%s", strrchr(folder, '/') + 1);
+    (void)snprintf(records, sizeof records, "%s", folder_in_memory());
     return gw_box_files_open(records);
 }
 

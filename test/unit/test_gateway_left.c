@@ -2,20 +2,20 @@
 // A setpoint that was left in the controller: the sentence for the operator, and the request for a restart of the bus.
 #include "bus/bus_facts.h"
 
-#include "unity.h"
+#include "folder.h"
+#include "unit.h"
 
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <sys/inotify.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-static char folder[] = "/tmp/iwheel-left-XXXXXX";
 static char path[64];
 static char victim[64];
 
 void setUp(void) {
+    folder_make();
     (void)snprintf(path, sizeof path, "%s/can0.restart", folder);
     (void)snprintf(victim, sizeof victim, "%s/victim", folder);
     FILE *file = fopen(victim, "w");
@@ -25,8 +25,7 @@ void setUp(void) {
 }
 
 void tearDown(void) {
-    (void)unlink(path);
-    (void)unlink(victim);
+    folder_remove();
 }
 
 static void expect_untouched(void) {
@@ -52,7 +51,7 @@ static unsigned writings_seen(int watch) {
     return seen;
 }
 
-static void test_left_each_request_is_a_new_event(void) {
+TEST(test_left_each_request_is_a_new_event) {
     const int watch = inotify_init1(IN_NONBLOCK | IN_CLOEXEC);
     TEST_ASSERT_TRUE(inotify_add_watch(watch, folder, IN_CLOSE_WRITE) >= 0);
     TEST_ASSERT_TRUE(gw_bus_left_ask(folder, "can0"));
@@ -62,7 +61,7 @@ static void test_left_each_request_is_a_new_event(void) {
     (void)close(watch);
 }
 
-static void test_left_request_is_not_written_through_a_link(void) {
+TEST(test_left_request_is_not_written_through_a_link) {
     struct stat what;
     TEST_ASSERT_EQUAL_INT(0, symlink(victim, path));
     TEST_ASSERT_TRUE(gw_bus_left_ask(folder, "can0"));
@@ -75,7 +74,7 @@ static void test_left_request_is_not_written_through_a_link(void) {
     expect_untouched();
 }
 
-static void test_left_request_without_directory_fails(void) {
+TEST(test_left_request_without_directory_fails) {
     char nowhere[300];
     memset(nowhere, 'x', sizeof nowhere);
     nowhere[sizeof nowhere - 1U] = '\0';
@@ -83,7 +82,7 @@ static void test_left_request_without_directory_fails(void) {
     TEST_ASSERT_FALSE(gw_bus_left_ask(nowhere, "can0"));
 }
 
-static void test_left_sentence_names_the_fix_for_each_kind_of_bus(void) {
+TEST(test_left_sentence_names_the_fix_for_each_kind_of_bus) {
     char sentence[400];
     iwl_bus_link_t link = {.presence = IWL_LINK_UP, .echo_proven = true};
     gw_bus_left_sentence(&link, "can0", sentence, sizeof sentence);
@@ -95,18 +94,4 @@ static void test_left_sentence_names_the_fix_for_each_kind_of_bus(void) {
     link.presence = IWL_LINK_LOCAL;
     gw_bus_left_sentence(&link, "unix:/run/bus", sentence, sizeof sentence);
     TEST_ASSERT_NOT_NULL(strstr(sentence, "start its hub (the simulator) again"));
-}
-
-int main(void) {
-    if (mkdtemp(folder) == NULL) {
-        return EXIT_FAILURE;
-    }
-    UNITY_BEGIN();
-    RUN_TEST(test_left_each_request_is_a_new_event);
-    RUN_TEST(test_left_request_is_not_written_through_a_link);
-    RUN_TEST(test_left_request_without_directory_fails);
-    RUN_TEST(test_left_sentence_names_the_fix_for_each_kind_of_bus);
-    const int result = UNITY_END();
-    (void)rmdir(folder);
-    return result;
 }

@@ -5,12 +5,12 @@
 #include "config/gateway_config.h"
 #include "sockets/log.h"
 
+#include "folder.h"
 #include "unit.h"
 
 #include <fcntl.h>
 #include <grp.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
@@ -23,19 +23,11 @@
 static gateway_config_t config;
 static sock_listener_t listener;
 static sock_log_t people; ///< Log for the operator
-static char folder[64];
 static char logged[1024];
-
-static const char *in_folder(const char *name) {
-    static char path[96];
-    (void)snprintf(path, sizeof path, "%s/%s", folder, name);
-    return path;
-}
 
 void setUp(void) {
     gateway_config_default(&config);
-    (void)snprintf(folder, sizeof folder, "/tmp/iwheel-listener-XXXXXX");
-    TEST_ASSERT_NOT_NULL(mkdtemp(folder));
+    folder_make();
     (void)snprintf(config.northbound.socket, sizeof config.northbound.socket, "%s/gateway.sock", folder);
     (void)snprintf(config.northbound.group, sizeof config.northbound.group, "none");
     listener = (sock_listener_t){.fd = -1, .reserve_fd = -1, .folder = {.fd = -1}};
@@ -46,11 +38,9 @@ void setUp(void) {
 }
 
 void tearDown(void) {
-    char command[96];
     sock_listener_close(&listener);
     sock_log_close(&people);
-    (void)snprintf(command, sizeof command, "rm -rf %s", folder);
-    TEST_ASSERT_EQUAL_INT(0, system(command));
+    folder_remove();
 }
 
 static int prepare(void) {

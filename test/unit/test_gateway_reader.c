@@ -6,8 +6,8 @@
 #include "iwheel_northbound/line.h"
 
 #include "box_end.h"
+#include "folder.h"
 #include "unit.h"
-#include <fcntl.h>
 #include <poll.h>
 #include <signal.h>
 #include <stdio.h>
@@ -18,21 +18,17 @@
 
 #define LOG "stop-000001-estop_line.log"
 
-static char folder[64];
 static char directory[80];
 static gw_box_answer_t answer;
 
 void setUp(void) {
-    (void)snprintf(folder, sizeof folder, "/tmp/iwheel-reader-XXXXXX");
-    TEST_ASSERT_NOT_NULL(mkdtemp(folder));
+    folder_make();
     (void)snprintf(directory, sizeof directory, "%s/records", folder);
     TEST_ASSERT_EQUAL(0, mkdir(directory, 0755));
 }
 
 void tearDown(void) {
-    char command[128];
-    (void)snprintf(command, sizeof command, "rm -rf %s", folder);
-    TEST_ASSERT_EQUAL(0, system(command));
+    folder_remove();
 }
 
 static const char *path_of(const char *name) {

@@ -8,13 +8,12 @@
 #include "iwheel_linux/clock.h"
 
 #include "box_end.h"
+#include "folder.h"
 #include "unit.h"
-#include <dirent.h>
 #include <errno.h>
 #include <poll.h>
 #include <signal.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
@@ -23,14 +22,12 @@
 #define CONFIG "[record]\nblackbox_s = 2\n"
 
 static gw_box_t box;
-static char folder[64];
 static char records[96];
 static sock_log_t log_;
 static iw_time_us_t now_us;
 
 void setUp(void) {
-    (void)snprintf(folder, sizeof folder, "/tmp/iwheel-request-XXXXXX");
-    TEST_ASSERT_NOT_NULL(mkdtemp(folder));
+    folder_make();
     (void)snprintf(records, sizeof records, "%s/records", folder);
     const gw_box_config_t wanted = {
         .blackbox_s = 2, .keep_stops = 3, .directory = records, .bus = "can0", .estop = "none", .config = CONFIG};
@@ -40,11 +37,9 @@ void setUp(void) {
 }
 
 void tearDown(void) {
-    char command[128];
     box_end(&box);
     sock_log_close(&log_);
-    (void)snprintf(command, sizeof command, "rm -rf %s", folder);
-    TEST_ASSERT_EQUAL(0, system(command));
+    folder_remove();
 }
 
 static void wait_result(void) {

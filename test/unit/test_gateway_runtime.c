@@ -4,12 +4,12 @@
 
 #include "config/gateway_config.h"
 
+#include "folder.h"
 #include "unit.h"
 
 #include <fcntl.h>
 #include <signal.h>
 #include <stddef.h>
-#include <stdlib.h>
 #include <string.h>
 #include <sys/file.h>
 #include <sys/socket.h>
@@ -19,7 +19,6 @@
 #include <sysexits.h>
 #include <unistd.h>
 
-static char top[] = "/tmp/iwheel-runtime-XXXXXX";
 static char shared[64];
 static gateway_config_t one;
 static gateway_config_t other;
@@ -28,17 +27,11 @@ static gw_runtime_t second;
 static char logged[2048];
 static pid_t child;
 
-static const char *under(const char *name) {
-    static char path[128];
-    (void)snprintf(path, sizeof path, "%s/%s", top, name);
-    return path;
-}
-
-static void configure(gateway_config_t *config, const char *bus, const char *folder) {
+static void configure(gateway_config_t *config, const char *bus, const char *name) {
     memset(config, 0, sizeof *config);
     (void)snprintf(config->bus.interface, sizeof config->bus.interface, "%s", bus);
-    (void)snprintf(config->northbound.socket, sizeof config->northbound.socket, "%s/%s/gateway.sock", top, folder);
-    (void)mkdir(under(folder), 0755);
+    (void)snprintf(config->northbound.socket, sizeof config->northbound.socket, "%s/%s/gateway.sock", folder, name);
+    (void)mkdir(in_folder(name), 0755);
 }
 
 /// Opens the runtime and stores its messages in `logged`.
@@ -69,9 +62,8 @@ static const char *interface(void) {
 }
 
 void setUp(void) {
-    memcpy(strrchr(top, '-'), "-XXXXXX", 8);
-    TEST_ASSERT_NOT_NULL(mkdtemp(top));
-    (void)snprintf(shared, sizeof shared, "%s/shared", top);
+    folder_make();
+    (void)snprintf(shared, sizeof shared, "%s/shared", folder);
     memset(logged, 0, sizeof logged);
     configure(&one, interface(), "one");
     configure(&other, interface(), "other");
@@ -85,17 +77,11 @@ static void end_child(void) {
     child = 0;
 }
 
-static void remove_top(void) {
-    char command[64];
-    (void)snprintf(command, sizeof command, "rm -rf %s", top);
-    TEST_ASSERT_EQUAL_INT(0, system(command));
-}
-
 void tearDown(void) {
     gw_runtime_close(&first);
     gw_runtime_close(&second);
     end_child();
-    remove_top();
+    folder_remove();
 }
 
 TEST(test_lock_second_gateway_with_other_socket_is_refused) {
@@ -134,7 +120,7 @@ TEST(test_lock_of_another_interface_is_free) {
 
 TEST(test_lock_second_gateway_on_local_bus_is_refused) {
     char bus[64];
-    (void)snprintf(bus, sizeof bus, "unix:%s/bus", top);
+    (void)snprintf(bus, sizeof bus, "unix:%s/bus", folder);
     configure(&one, bus, "one");
     configure(&other, bus, "other");
     TEST_ASSERT_EQUAL_INT(0, open_runtime(&first, &one));
@@ -142,7 +128,7 @@ TEST(test_lock_second_gateway_on_local_bus_is_refused) {
     assert_said_pid(getpid());
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(logged, bus + 5), logged);
     TEST_ASSERT_TRUE(gw_runtime_mark(&first, true));
-    TEST_ASSERT_TRUE(exists(under("bus.armed")));
+    TEST_ASSERT_TRUE(exists(in_folder("bus.armed")));
     TEST_ASSERT_FALSE(exists(shared));
 }
 
@@ -165,7 +151,7 @@ TEST(test_marker_is_found_by_a_gateway_with_other_socket) {
 
 TEST(test_marker_makes_the_shared_directory_again_that_was_removed) {
     TEST_ASSERT_EQUAL_INT(0, open_runtime(&first, &one));
-    TEST_ASSERT_EQUAL_INT(0, rename(shared, under("removed")));
+    TEST_ASSERT_EQUAL_INT(0, rename(shared, in_folder("removed")));
     TEST_ASSERT_TRUE(gw_runtime_mark(&first, true));
     TEST_ASSERT_TRUE(exists(first.place[0]));
     TEST_ASSERT_EQUAL_STRING(first.place[0], first.marker_path);
@@ -176,7 +162,7 @@ TEST(test_marker_without_shared_directory_is_next_to_the_socket) {
     TEST_ASSERT_NOT_NULL(in_the_way);
     (void)fclose(in_the_way);
     crash_while_sending(&one);
-    TEST_ASSERT_TRUE(strncmp(first.marker_path, under("one"), strlen(under("one"))) == 0);
+    TEST_ASSERT_TRUE(strncmp(first.marker_path, in_folder("one"), strlen(in_folder("one"))) == 0);
     TEST_ASSERT_EQUAL_INT(0, open_runtime(&first, &one));
     TEST_ASSERT_TRUE(gw_runtime_crashed(&first));
     TEST_ASSERT_TRUE(gw_runtime_mark(&first, false));
@@ -221,7 +207,7 @@ static int in_process_of(uid_t uid, int (*act)(void)) {
     int result = -1;
     int ends[2];
     TEST_ASSERT_EQUAL_INT(0, pipe(ends));
-    TEST_ASSERT_EQUAL_INT(0, chmod(top, 0755));
+    TEST_ASSERT_EQUAL_INT(0, chmod(folder, 0755));
     child = fork();
     if (child == 0) {
         result = (setgid(uid) == 0 && setuid(uid) == 0) ? act() : -2;
@@ -343,7 +329,7 @@ TEST(test_lock_at_a_later_name_excludes_after_the_first_is_free) {
 }
 
 static int hold_file(void) {
-    const int fd = open(under("bus.gateway-lock"), O_RDWR | O_CREAT, 0666);
+    const int fd = open(in_folder("bus.gateway-lock"), O_RDWR | O_CREAT, 0666);
     return (fd >= 0) ? flock(fd, LOCK_EX | LOCK_NB) : -1;
 }
 
@@ -352,13 +338,13 @@ TEST(test_lock_of_local_bus_with_held_file_excludes) {
     if (!is_root()) {
         return;
     }
-    (void)snprintf(bus, sizeof bus, "unix:%s/bus", top);
+    (void)snprintf(bus, sizeof bus, "unix:%s/bus", folder);
     configure(&one, bus, "one");
     configure(&other, bus, "other");
-    TEST_ASSERT_EQUAL_INT(0, chown(top, STRANGER, 0));
+    TEST_ASSERT_EQUAL_INT(0, chown(folder, STRANGER, 0));
     TEST_ASSERT_EQUAL_INT(0, in_process_of(STRANGER, hold_file));
-    TEST_ASSERT_EQUAL_INT(0, chown(top, 0, 0));
-    TEST_ASSERT_EQUAL_INT(0, chmod(top, 01777));
+    TEST_ASSERT_EQUAL_INT(0, chown(folder, 0, 0));
+    TEST_ASSERT_EQUAL_INT(0, chmod(folder, 01777));
     TEST_ASSERT_EQUAL_INT_MESSAGE(0, open_runtime(&first, &one), logged);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(logged, "of user 65534 holds"), logged);
     TEST_ASSERT_EQUAL_INT(EX_UNAVAILABLE, open_runtime(&second, &other));
@@ -487,8 +473,8 @@ TEST(test_lock_of_simultaneous_starts_is_acquired_by_one) {
     for (int round = 0; round < 3; round++) {
         TEST_ASSERT_EQUAL_INT(1, how_many_run());
     }
-    remove_top();
-    TEST_ASSERT_EQUAL_INT(0, mkdir(top, 0755));
+    folder_remove();
+    TEST_ASSERT_EQUAL_INT(0, mkdir(folder, 0755));
     spoil_shared(); // Found only by its name
     for (int round = 0; round < 3; round++) {
         TEST_ASSERT_EQUAL_INT(1, how_many_run());

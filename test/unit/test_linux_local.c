@@ -3,22 +3,20 @@
 // sleeps.
 #include "iwheel_linux/linux_hal.h"
 
-#include "unity.h"
+#include "folder.h"
+#include "unit.h"
 
 #include <errno.h>
 #include <linux/can.h>
 #include <linux/can/error.h>
 #include <poll.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
-#include <sys/stat.h>
 #include <sys/un.h>
 #include <unistd.h>
 
-static char folder[] = "/tmp/iwheel-linux-XXXXXX";
 static char bus_name[64];
 static char estop_name[64];
 static iwl_hal_t hal;
@@ -68,6 +66,9 @@ static bool wakes(int fd) {
 
 void setUp(void) {
     const char *cause = NULL;
+    folder_make();
+    (void)snprintf(bus_name, sizeof bus_name, "unix:%s/bus", folder);
+    (void)snprintf(estop_name, sizeof estop_name, "unix:%s/estop", folder);
     bus_listener = listen_at(bus_name, SOCK_SEQPACKET);
     now_us = 1000000;
     TEST_ASSERT_EQUAL_INT(0, iwl_hal_open(&hal, bus_name, &(iwl_estop_config_t){.name = estop_name}, &cause));
@@ -87,9 +88,10 @@ void tearDown(void) {
     (void)close(button);
     (void)close(bus_listener);
     (void)close(estop_listener);
+    folder_remove();
 }
 
-static void test_local_frame_is_sent_unchanged_and_its_echo_has_the_mark(void) {
+TEST(test_local_frame_is_sent_unchanged_and_its_echo_has_the_mark) {
     const iw_can_frame_t frame = {.id = 266, .dlc = 5, .data = {1, 2, 3, 4, 5}};
     struct can_frame raw;
     iw_can_frame_t received;
@@ -111,7 +113,7 @@ static void test_local_frame_is_sent_unchanged_and_its_echo_has_the_mark(void) {
     TEST_ASSERT_FALSE(wakes(iwl_hal_bus_fd(&hal)));
 }
 
-static void test_local_frames_of_several_batches_arrive_in_order(void) {
+TEST(test_local_frames_of_several_batches_arrive_in_order) {
     iw_can_frame_t received;
     unsigned expected = 0;
     for (unsigned i = 0; i < 100; i++) {
@@ -126,7 +128,7 @@ static void test_local_frames_of_several_batches_arrive_in_order(void) {
     TEST_ASSERT_EQUAL_UINT(100, expected);
 }
 
-static void test_local_frame_formats_differ(void) {
+TEST(test_local_frame_formats_differ) {
     iw_can_frame_t received;
     send_frame(256U | CAN_RTR_FLAG, 4, 0, 0);
     send_frame(256U | CAN_EFF_FLAG, 4, 0, 0);
@@ -139,7 +141,7 @@ static void test_local_frame_formats_differ(void) {
     TEST_ASSERT_EQUAL_HEX32(0x1ABCDEFU | IW_CAN_EXTENDED | IW_CAN_REMOTE, received.id);
 }
 
-static void test_local_messages_of_another_size_are_ignored(void) {
+TEST(test_local_messages_of_another_size_are_ignored) {
     iw_can_frame_t received;
     char junk[40] = {0};
     TEST_ASSERT_EQUAL_INT(15, (int)send(hub, junk, 15, 0));
@@ -151,7 +153,7 @@ static void test_local_messages_of_another_size_are_ignored(void) {
     TEST_ASSERT_EQUAL_INT(0, receive(&received));
 }
 
-static void test_local_hub_lost_and_back_between_reads_is_reported_once(void) {
+TEST(test_local_hub_lost_and_back_between_reads_is_reported_once) {
     iw_can_frame_t received;
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, bus());
     send_frame(256, 4, 0, 0);
@@ -165,7 +167,7 @@ static void test_local_hub_lost_and_back_between_reads_is_reported_once(void) {
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, bus());
 }
 
-static void test_local_half_read_batch_is_dropped_when_the_hub_is_lost(void) {
+TEST(test_local_half_read_batch_is_dropped_when_the_hub_is_lost) {
     const iw_can_frame_t frame = {.id = 266, .dlc = 5};
     iw_can_frame_t received;
     for (unsigned i = 0; i < 10; i++) {
@@ -181,7 +183,7 @@ static void test_local_half_read_batch_is_dropped_when_the_hub_is_lost(void) {
     TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, bus());
 }
 
-static void test_local_lost_hub_is_down_and_retried_at_the_back_off(void) {
+TEST(test_local_lost_hub_is_down_and_retried_at_the_back_off) {
     iw_can_frame_t received;
     const iw_can_frame_t frame = {.id = 266, .dlc = 5};
     (void)close(bus_listener);
@@ -209,7 +211,7 @@ static void test_local_lost_hub_is_down_and_retried_at_the_back_off(void) {
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, bus());
 }
 
-static void test_local_error_frames_change_only_the_state(void) {
+TEST(test_local_error_frames_change_only_the_state) {
     iw_can_frame_t received;
     struct can_frame passive = {.can_id = CAN_ERR_FLAG | CAN_ERR_CRTL, .len = 8};
     passive.data[1] = CAN_ERR_CRTL_TX_PASSIVE;
@@ -227,7 +229,7 @@ static void test_local_error_frames_change_only_the_state(void) {
     TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, bus());
 }
 
-static void test_local_state_frames_of_clients_cannot_end_bus_off(void) {
+TEST(test_local_state_frames_of_clients_cannot_end_bus_off) {
     static const uint32_t good[] = {CAN_ERR_FLAG | CAN_ERR_RESTARTED, CAN_ERR_FLAG | CAN_ERR_CRTL};
     iw_can_frame_t received;
     send_frame(CAN_ERR_FLAG | CAN_ERR_BUSOFF, 8, 2, 0);
@@ -249,7 +251,7 @@ static void test_local_state_frames_of_clients_cannot_end_bus_off(void) {
     TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, bus());
 }
 
-static void test_local_restart_reports_a_missed_bus_off(void) {
+TEST(test_local_restart_reports_a_missed_bus_off) {
     iw_can_frame_t received;
     send_frame(CAN_ERR_FLAG | CAN_ERR_RESTARTED, 8, 0, 0);
     TEST_ASSERT_EQUAL_INT(0, receive(&received));
@@ -257,7 +259,7 @@ static void test_local_restart_reports_a_missed_bus_off(void) {
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, bus());
 }
 
-static void test_local_full_hub_refuses_the_frame_and_stays_active(void) {
+TEST(test_local_full_hub_refuses_the_frame_and_stays_active) {
     const iw_can_frame_t frame = {.id = 266, .dlc = 5};
     unsigned sent = 0;
     int result = 1;
@@ -270,7 +272,7 @@ static void test_local_full_hub_refuses_the_frame_and_stays_active(void) {
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, bus());
 }
 
-static void test_local_purge_reconnects_to_the_hub_and_reports_a_loss(void) {
+TEST(test_local_purge_reconnects_to_the_hub_and_reports_a_loss) {
     const iw_can_frame_t frame = {.id = 266, .dlc = 5};
     struct can_frame raw;
     iw_can_frame_t received;
@@ -294,7 +296,7 @@ static void test_local_purge_reconnects_to_the_hub_and_reports_a_loss(void) {
     TEST_ASSERT_TRUE(iwl_bus_send(&hal.bus, &frame, 1) > 0);
 }
 
-static void test_local_estop_is_unreadable_until_the_first_byte(void) {
+TEST(test_local_estop_is_unreadable_until_the_first_byte) {
     TEST_ASSERT_EQUAL_INT(-1, estop());
     press("0");
     TEST_ASSERT_TRUE(wakes(iwl_hal_estop_fd(&hal)));
@@ -302,7 +304,7 @@ static void test_local_estop_is_unreadable_until_the_first_byte(void) {
     TEST_ASSERT_EQUAL_INT(0, estop());
 }
 
-static void test_local_estop_pulse_between_two_reads_is_an_edge(void) {
+TEST(test_local_estop_pulse_between_two_reads_is_an_edge) {
     press("0");
     TEST_ASSERT_EQUAL_INT(0, estop());
     press("10");
@@ -319,7 +321,7 @@ static void test_local_estop_pulse_between_two_reads_is_an_edge(void) {
     TEST_ASSERT_EQUAL_INT(0, estop());
 }
 
-static void test_local_estop_any_byte_but_zero_is_pressed(void) {
+TEST(test_local_estop_any_byte_but_zero_is_pressed) {
     press("0");
     TEST_ASSERT_EQUAL_INT(0, estop());
     press("?");
@@ -327,7 +329,7 @@ static void test_local_estop_any_byte_but_zero_is_pressed(void) {
     TEST_ASSERT_TRUE(estop() > 0);
 }
 
-static void test_local_estop_reconnected_is_unreadable_until_first_byte(void) {
+TEST(test_local_estop_reconnected_is_unreadable_until_first_byte) {
     press("0");
     TEST_ASSERT_EQUAL_INT(0, estop());
     (void)close(button);
@@ -341,7 +343,7 @@ static void test_local_estop_reconnected_is_unreadable_until_first_byte(void) {
     TEST_ASSERT_EQUAL_INT(0, hal.estop_last);
 }
 
-static void test_local_names_without_a_backend_leave_no_descriptor_open(void) {
+TEST(test_local_names_without_a_backend_leave_no_descriptor_open) {
     static iwl_hal_t other;
     const char *cause = NULL;
     const int before = dup(0);
@@ -363,7 +365,7 @@ static void test_local_names_without_a_backend_leave_no_descriptor_open(void) {
     TEST_ASSERT_EQUAL_INT(before, after);
 }
 
-static void test_local_two_contacts_must_be_of_one_kind(void) {
+TEST(test_local_two_contacts_must_be_of_one_kind) {
     static iwl_hal_t other;
     static char second_name[200];
     const char *cause = NULL;
@@ -397,7 +399,7 @@ static void test_local_two_contacts_must_be_of_one_kind(void) {
     TEST_ASSERT_EQUAL_INT(before, after);
 }
 
-static void test_local_without_an_estop_is_released(void) {
+TEST(test_local_without_an_estop_is_released) {
     static iwl_hal_t other;
     const char *cause = NULL;
     TEST_ASSERT_EQUAL_INT(0, iwl_hal_open(&other, bus_name, &(iwl_estop_config_t){.name = "none"}, &cause));
@@ -429,7 +431,7 @@ static void come_back(void) {
     TEST_ASSERT_TRUE(hub >= 0);
 }
 
-static void test_local_lost_hub_is_retried_with_growing_intervals(void) {
+TEST(test_local_lost_hub_is_retried_with_growing_intervals) {
     for (unsigned time = 0; time < 2U; time++) {
         (void)close(bus_listener);
         lose_hub();
@@ -438,7 +440,7 @@ static void test_local_lost_hub_is_retried_with_growing_intervals(void) {
     }
 }
 
-static void test_local_hub_absent_at_start_is_retried_after_20_ms(void) {
+TEST(test_local_hub_absent_at_start_is_retried_after_20_ms) {
     static iwl_hal_t other;
     const char *cause = NULL;
     char name[96];
@@ -449,7 +451,7 @@ static void test_local_hub_absent_at_start_is_retried_after_20_ms(void) {
     iwl_hal_close(&other);
 }
 
-static void test_local_bus_off_lasts_until_a_new_hub(void) {
+TEST(test_local_bus_off_lasts_until_a_new_hub) {
     iw_can_frame_t received;
     send_frame(CAN_ERR_FLAG | CAN_ERR_BUSOFF, 8, 0, 0);
     TEST_ASSERT_EQUAL_INT(0, receive(&received));
@@ -464,7 +466,7 @@ static void test_local_bus_off_lasts_until_a_new_hub(void) {
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, bus());
 }
 
-static void test_local_without_descriptors_open_fails_and_poll_retries(void) {
+TEST(test_local_without_descriptors_open_fails_and_poll_retries) {
     static iwl_hal_t other;
     const char *cause = NULL;
     struct rlimit before;
@@ -484,47 +486,9 @@ static void test_local_without_descriptors_open_fails_and_poll_retries(void) {
     TEST_ASSERT_TRUE(hub >= 0);
 }
 
-static void test_local_bus_has_no_timing_and_a_proven_echo(void) {
+TEST(test_local_bus_has_no_timing_and_a_proven_echo) {
     const iwl_bus_link_t *link = iwl_hal_link(&hal);
     TEST_ASSERT_EQUAL_INT(IWL_LINK_LOCAL, link->presence);
     TEST_ASSERT_TRUE(link->is_virtual);
     TEST_ASSERT_TRUE(link->echo_proven);
-}
-
-int main(void) {
-    if (mkdtemp(folder) == NULL) {
-        return 1;
-    }
-    (void)snprintf(bus_name, sizeof bus_name, "unix:%s/bus", folder);
-    (void)snprintf(estop_name, sizeof estop_name, "unix:%s/estop", folder);
-    UNITY_BEGIN();
-    RUN_TEST(test_local_frame_is_sent_unchanged_and_its_echo_has_the_mark);
-    RUN_TEST(test_local_bus_has_no_timing_and_a_proven_echo);
-    RUN_TEST(test_local_lost_hub_is_retried_with_growing_intervals);
-    RUN_TEST(test_local_hub_absent_at_start_is_retried_after_20_ms);
-    RUN_TEST(test_local_bus_off_lasts_until_a_new_hub);
-    RUN_TEST(test_local_without_descriptors_open_fails_and_poll_retries);
-    RUN_TEST(test_local_frames_of_several_batches_arrive_in_order);
-    RUN_TEST(test_local_frame_formats_differ);
-    RUN_TEST(test_local_messages_of_another_size_are_ignored);
-    RUN_TEST(test_local_hub_lost_and_back_between_reads_is_reported_once);
-    RUN_TEST(test_local_half_read_batch_is_dropped_when_the_hub_is_lost);
-    RUN_TEST(test_local_lost_hub_is_down_and_retried_at_the_back_off);
-    RUN_TEST(test_local_error_frames_change_only_the_state);
-    RUN_TEST(test_local_state_frames_of_clients_cannot_end_bus_off);
-    RUN_TEST(test_local_restart_reports_a_missed_bus_off);
-    RUN_TEST(test_local_purge_reconnects_to_the_hub_and_reports_a_loss);
-    RUN_TEST(test_local_full_hub_refuses_the_frame_and_stays_active);
-    RUN_TEST(test_local_estop_is_unreadable_until_the_first_byte);
-    RUN_TEST(test_local_estop_pulse_between_two_reads_is_an_edge);
-    RUN_TEST(test_local_estop_any_byte_but_zero_is_pressed);
-    RUN_TEST(test_local_estop_reconnected_is_unreadable_until_first_byte);
-    RUN_TEST(test_local_names_without_a_backend_leave_no_descriptor_open);
-    RUN_TEST(test_local_two_contacts_must_be_of_one_kind);
-    RUN_TEST(test_local_without_an_estop_is_released);
-    const int failed = UNITY_END();
-    (void)unlink(bus_name + 5);
-    (void)unlink(estop_name + 5);
-    (void)rmdir(folder);
-    return failed;
 }

@@ -3,7 +3,7 @@
 // kernel.
 #include "netlink.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <errno.h>
 #include <libmnl/libmnl.h>
@@ -126,11 +126,13 @@ static void add_controller(const controller_t *controller) {
 }
 
 void setUp(void) {
+    if (kernel == NULL) {
+        kernel = (kernel_t *)mmap(NULL, sizeof *kernel, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+        TEST_ASSERT_TRUE(kernel != MAP_FAILED);
+    }
     memset(kernel, 0, sizeof *kernel);
     memset(&reading, 0xA5, sizeof reading);
 }
-
-void tearDown(void) {}
 
 static void parse_state(uint32_t state, iw_bus_state_t expected) {
     begin(IFF_UP | IFF_ECHO);
@@ -139,7 +141,7 @@ static void parse_state(uint32_t state, iw_bus_state_t expected) {
     TEST_ASSERT_EQUAL(expected, reading.state);
 }
 
-static void test_netlink_controller_values_are_all_parsed(void) {
+TEST(test_netlink_controller_values_are_all_parsed) {
     begin(IFF_UP | IFF_ECHO);
     add_controller(&(controller_t){.bitrate = 1000000, .sample_point = 625, .restart_ms = 100});
     TEST_ASSERT_TRUE(iwl_netlink_parse(message, &reading));
@@ -154,7 +156,7 @@ static void test_netlink_controller_values_are_all_parsed(void) {
     TEST_ASSERT_EQUAL_UINT32(10, reading.link.queue_length);
 }
 
-static void test_netlink_controller_states_map_to_bus_states(void) {
+TEST(test_netlink_controller_states_map_to_bus_states) {
     parse_state(CAN_STATE_ERROR_ACTIVE, IW_BUS_ACTIVE);
     parse_state(CAN_STATE_ERROR_WARNING, IW_BUS_ACTIVE);
     parse_state(CAN_STATE_ERROR_PASSIVE, IW_BUS_PASSIVE);
@@ -164,7 +166,7 @@ static void test_netlink_controller_states_map_to_bus_states(void) {
     parse_state(99, IW_BUS_DOWN);
 }
 
-static void test_netlink_controller_modes_set_echo_proven_and_mute(void) {
+TEST(test_netlink_controller_modes_set_echo_proven_and_mute) {
     begin(IFF_UP | IFF_ECHO);
     add_controller(&(controller_t){.mode = CAN_CTRLMODE_LOOPBACK});
     TEST_ASSERT_TRUE(iwl_netlink_parse(message, &reading));
@@ -180,14 +182,14 @@ static void test_netlink_controller_modes_set_echo_proven_and_mute(void) {
     TEST_ASSERT_TRUE(reading.link.is_mute);
 }
 
-static void test_netlink_controller_without_echo_flag_is_not_proven(void) {
+TEST(test_netlink_controller_without_echo_flag_is_not_proven) {
     begin(IFF_UP);
     add_controller(&(controller_t){.bitrate = 1000000});
     TEST_ASSERT_TRUE(iwl_netlink_parse(message, &reading));
     TEST_ASSERT_FALSE(reading.link.echo_proven);
 }
 
-static void test_netlink_interface_down_ignores_the_controller_state(void) {
+TEST(test_netlink_interface_down_ignores_the_controller_state) {
     begin(IFF_ECHO);
     add_controller(&(controller_t){.state = CAN_STATE_ERROR_ACTIVE});
     TEST_ASSERT_TRUE(iwl_netlink_parse(message, &reading));
@@ -195,7 +197,7 @@ static void test_netlink_interface_down_ignores_the_controller_state(void) {
     TEST_ASSERT_EQUAL(IW_BUS_DOWN, reading.state);
 }
 
-static void test_netlink_virtual_interface_is_active_without_timing(void) {
+TEST(test_netlink_virtual_interface_is_active_without_timing) {
     begin(IFF_UP);
     struct nlattr *info = mnl_attr_nest_start(message, IFLA_LINKINFO);
     mnl_attr_put_strz(message, IFLA_INFO_KIND, "vcan");
@@ -207,7 +209,7 @@ static void test_netlink_virtual_interface_is_active_without_timing(void) {
     TEST_ASSERT_EQUAL_UINT32(0, reading.link.bitrate_hz);
 }
 
-static void test_netlink_interface_of_another_type_is_not_can(void) {
+TEST(test_netlink_interface_of_another_type_is_not_can) {
     begin(IFF_UP | IFF_ECHO);
     interface->ifi_type = ARPHRD_ETHER;
     add_controller(&(controller_t){.state = CAN_STATE_ERROR_ACTIVE});
@@ -217,7 +219,7 @@ static void test_netlink_interface_of_another_type_is_not_can(void) {
     TEST_ASSERT_FALSE(reading.link.echo_proven);
 }
 
-static void test_netlink_values_that_are_too_short_are_not_reported(void) {
+TEST(test_netlink_values_that_are_too_short_are_not_reported) {
     begin(IFF_UP | IFF_ECHO);
     struct nlattr *info = mnl_attr_nest_start(message, IFLA_LINKINFO);
     mnl_attr_put_strz(message, IFLA_INFO_KIND, "can");
@@ -231,7 +233,7 @@ static void test_netlink_values_that_are_too_short_are_not_reported(void) {
     TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, reading.state);
 }
 
-static void test_netlink_kind_with_the_prefix_can_is_virtual(void) {
+TEST(test_netlink_kind_with_the_prefix_can_is_virtual) {
     begin(IFF_UP);
     struct nlattr *info = mnl_attr_nest_start(message, IFLA_LINKINFO);
     mnl_attr_put_strz(message, IFLA_INFO_KIND, "canary");
@@ -240,7 +242,7 @@ static void test_netlink_kind_with_the_prefix_can_is_virtual(void) {
     TEST_ASSERT_TRUE(reading.link.is_virtual);
 }
 
-static void test_netlink_messages_of_another_kind_are_refused(void) {
+TEST(test_netlink_messages_of_another_kind_are_refused) {
     begin(IFF_UP);
     message->nlmsg_type = RTM_NEWADDR;
     TEST_ASSERT_FALSE(iwl_netlink_parse(message, &reading));
@@ -249,7 +251,7 @@ static void test_netlink_messages_of_another_kind_are_refused(void) {
     TEST_ASSERT_FALSE(iwl_netlink_parse(message, &reading));
 }
 
-static void test_netlink_attributes_cut_anywhere_do_not_crash(void) {
+TEST(test_netlink_attributes_cut_anywhere_do_not_crash) {
     begin(IFF_UP | IFF_ECHO);
     add_controller(&(controller_t){.bitrate = 1000000, .sample_point = 625});
     const uint32_t whole = message->nlmsg_len;
@@ -260,7 +262,7 @@ static void test_netlink_attributes_cut_anywhere_do_not_crash(void) {
     }
 }
 
-static void test_netlink_socket_has_no_group_and_is_closed_once(void) {
+TEST(test_netlink_socket_has_no_group_and_is_closed_once) {
     iwl_netlink_t netlink;
     TEST_ASSERT_EQUAL_INT(0, iwl_netlink_open(&netlink));
     TEST_ASSERT_EQUAL_UINT(0, kernel->groups);
@@ -274,7 +276,7 @@ static void test_netlink_socket_has_no_group_and_is_closed_once(void) {
     TEST_ASSERT_EQUAL_UINT(2, kernel->closed);
 }
 
-static void test_netlink_request_reads_the_reply_with_its_sequence(void) {
+TEST(test_netlink_request_reads_the_reply_with_its_sequence) {
     iwl_netlink_t netlink;
     TEST_ASSERT_EQUAL_INT(0, iwl_netlink_open(&netlink));
     kernel->answer[0] = EPERM;
@@ -297,7 +299,7 @@ static int restarted(void) {
     return result;
 }
 
-static void test_netlink_restart_retries_up_until_the_link_is_up(void) {
+TEST(test_netlink_restart_retries_up_until_the_link_is_up) {
     kernel->answer[1] = kernel->answer[2] = EBUSY;
     TEST_ASSERT_EQUAL_INT(0, restarted());
     TEST_ASSERT_EQUAL_UINT(4, kernel->asked);
@@ -306,7 +308,7 @@ static void test_netlink_restart_retries_up_until_the_link_is_up(void) {
     TEST_ASSERT_GREATER_THAN_UINT(1, kernel->slept);
 }
 
-static void test_netlink_restart_refused_by_the_kernel_fails_immediately(void) {
+TEST(test_netlink_restart_refused_by_the_kernel_fails_immediately) {
     kernel->answer[0] = EPERM;
     TEST_ASSERT_EQUAL_INT(EPERM, restarted());
     TEST_ASSERT_EQUAL_UINT(1, kernel->asked);
@@ -316,7 +318,7 @@ static void test_netlink_restart_refused_by_the_kernel_fails_immediately(void) {
     TEST_ASSERT_EQUAL_UINT(2, kernel->asked);
 }
 
-static void test_netlink_restart_process_that_was_killed_has_failed(void) {
+TEST(test_netlink_restart_process_that_was_killed_has_failed) {
     const pid_t process = fork();
     siginfo_t ended;
     if (process == 0) {
@@ -325,29 +327,4 @@ static void test_netlink_restart_process_that_was_killed_has_failed(void) {
     TEST_ASSERT_EQUAL_INT(0, waitid(P_PID, (id_t)process, &ended, WEXITED | WNOWAIT));
     TEST_ASSERT_EQUAL_INT(EIO, iwl_netlink_restart_poll(process));
     TEST_ASSERT_EQUAL_INT_MESSAGE(0, iwl_netlink_restart_poll(process), "another process has read its status");
-}
-
-int main(void) {
-    kernel = (kernel_t *)mmap(NULL, sizeof *kernel, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
-    if (kernel == MAP_FAILED) {
-        return 1;
-    }
-    UNITY_BEGIN();
-    RUN_TEST(test_netlink_controller_values_are_all_parsed);
-    RUN_TEST(test_netlink_controller_states_map_to_bus_states);
-    RUN_TEST(test_netlink_controller_modes_set_echo_proven_and_mute);
-    RUN_TEST(test_netlink_controller_without_echo_flag_is_not_proven);
-    RUN_TEST(test_netlink_interface_down_ignores_the_controller_state);
-    RUN_TEST(test_netlink_virtual_interface_is_active_without_timing);
-    RUN_TEST(test_netlink_interface_of_another_type_is_not_can);
-    RUN_TEST(test_netlink_values_that_are_too_short_are_not_reported);
-    RUN_TEST(test_netlink_kind_with_the_prefix_can_is_virtual);
-    RUN_TEST(test_netlink_messages_of_another_kind_are_refused);
-    RUN_TEST(test_netlink_attributes_cut_anywhere_do_not_crash);
-    RUN_TEST(test_netlink_socket_has_no_group_and_is_closed_once);
-    RUN_TEST(test_netlink_request_reads_the_reply_with_its_sequence);
-    RUN_TEST(test_netlink_restart_retries_up_until_the_link_is_up);
-    RUN_TEST(test_netlink_restart_refused_by_the_kernel_fails_immediately);
-    RUN_TEST(test_netlink_restart_process_that_was_killed_has_failed);
-    return UNITY_END();
 }

@@ -3,7 +3,7 @@
 #include "announced.h"
 #include "log_limit.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -18,9 +18,6 @@ static uint8_t message[SIZE];
 static uint8_t before[SIZE];
 static size_t length;
 static bool is_of_a_writer; ///< Result of the last call by `finish`.
-
-void setUp(void) {}
-void tearDown(void) {}
 
 static void put(unsigned value, bool little) {
     rtps_write(value, 2, little, message + length);
@@ -93,7 +90,7 @@ static void expect_dropped(uint8_t kind, uint8_t second, bool little, bool has_q
     TEST_ASSERT_EQUAL_MEMORY(before, message, sizeof before); // Nothing else has changed.
 }
 
-static void test_announced_large_data_becomes_padding_and_the_rest_stays(void) {
+TEST(test_announced_large_data_becomes_padding_and_the_rest_stays) {
     for (unsigned form = 0; form < 4U; form++) {
         expect_dropped(3, 0, (form & 1U) != 0U, (form & 2U) != 0U);
         expect_dropped(4, 0, (form & 1U) != 0U, (form & 2U) != 0U);
@@ -102,7 +99,7 @@ static void test_announced_large_data_becomes_padding_and_the_rest_stays(void) {
 }
 
 /// CycloneDDS sends messages of more than 1344 bytes in fragments: the free data begins in the first one and ends in another.
-static void test_announced_data_begun_in_first_fragment_becomes_padding(void) {
+TEST(test_announced_data_begun_in_first_fragment_becomes_padding) {
     for (unsigned first = 1; first <= 2U; first++) {
         (void)begin(3, 0, true, false);
         memmove(message + 56, message + 44, 4); // Moves the encapsulation behind the longer head.
@@ -123,7 +120,7 @@ static void test_announced_data_begun_in_first_fragment_becomes_padding(void) {
     }
 }
 
-static void test_announced_data_of_a_user_is_untouched(void) {
+TEST(test_announced_data_of_a_user_is_untouched) {
     (void)begin(5, 0, true, false);
     (void)parameter(USER, 4000, true);
     finish(true);
@@ -138,7 +135,7 @@ static void test_announced_data_of_a_user_is_untouched(void) {
 
 /// Cuts the message at every length and damages every byte of its heads: the function reads nothing beyond the message (a sanitizer
 /// would report it) and changes nothing beyond it.
-static void test_announced_message_that_is_cut_or_damaged_is_survived(void) {
+TEST(test_announced_message_that_is_cut_or_damaged_is_survived) {
     (void)begin(3, 0, true, true);
     (void)parameter(NAME, 40, true);
     (void)parameter(USER, 600, true);
@@ -160,7 +157,7 @@ static void test_announced_message_that_is_cut_or_damaged_is_survived(void) {
     }
 }
 
-static void test_log_of_others_is_bounded_and_counts_what_it_leaves_out(void) {
+TEST(test_log_of_others_is_bounded_and_counts_what_it_leaves_out) {
     log_limit_t limit = {.since_us = 0};
     uint64_t dropped = 0;
     unsigned passed = 0;
@@ -174,14 +171,4 @@ static void test_log_of_others_is_bounded_and_counts_what_it_leaves_out(void) {
     TEST_ASSERT_EQUAL_UINT64(1001U - LOG_LIMIT_LINES, dropped);
     TEST_ASSERT_TRUE(log_limit_pass(&limit, 6U + LOG_LIMIT_US, &dropped));
     TEST_ASSERT_EQUAL_UINT64(0, dropped);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_announced_large_data_becomes_padding_and_the_rest_stays);
-    RUN_TEST(test_announced_data_begun_in_first_fragment_becomes_padding);
-    RUN_TEST(test_announced_data_of_a_user_is_untouched);
-    RUN_TEST(test_announced_message_that_is_cut_or_damaged_is_survived);
-    RUN_TEST(test_log_of_others_is_bounded_and_counts_what_it_leaves_out);
-    return UNITY_END();
 }

@@ -3,6 +3,7 @@
 // second.
 #include "simulator.h"
 
+#include "folder.h"
 #include "unit.h"
 
 #include <linux/can.h>
@@ -10,7 +11,6 @@
 #include <poll.h>
 #include <signal.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
@@ -20,7 +20,6 @@
 
 #define WITHIN_MS 3000
 
-static char folder[64];
 static sim_options_t options;
 static pid_t child;
 
@@ -75,8 +74,7 @@ static int end(int signal_number) {
 }
 
 void setUp(void) {
-    (void)snprintf(folder, sizeof folder, "/tmp/iwheel-hub-XXXXXX");
-    TEST_ASSERT_NOT_NULL(mkdtemp(folder));
+    folder_make();
     set_options();
     child = 0;
 }
@@ -85,10 +83,7 @@ void tearDown(void) {
     if (child > 0) {
         (void)end(SIGKILL);
     }
-    (void)unlink(options.can_path);
-    (void)unlink(options.estop_path);
-    (void)unlink(options.control_path);
-    (void)rmdir(folder);
+    folder_remove();
 }
 
 static size_t receive(int fd, void *out, size_t size) {

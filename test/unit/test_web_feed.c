@@ -5,6 +5,7 @@
 #include "token.h"
 #include "web_settings.h"
 
+#include "folder.h"
 #include "unit.h"
 
 #include <stdlib.h>
@@ -234,21 +235,18 @@ TEST(test_settings_for_other_machines_are_accepted_with_tls) {
 
 // ---- token ----------------------------------------------------------------------------------------------------------
 
-static char folder[] = "/tmp/iwheel-token-XXXXXX";
 static char path[64];
 static FILE *null;
 
 static void begin_token(web_token_t *token, uint32_t hours) {
-    memcpy(strrchr(folder, '-'), "-XXXXXX", 8);
-    TEST_ASSERT_NOT_NULL(mkdtemp(folder));
+    folder_make();
     (void)snprintf(path, sizeof path, "%s/token", folder);
     null = fopen("/dev/null", "w");
     *token = (web_token_t){.path = path, .hours = hours};
 }
 
 static void end_token(void) {
-    (void)unlink(path);
-    (void)rmdir(folder);
+    folder_remove();
     (void)fclose(null);
 }
 

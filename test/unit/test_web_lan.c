@@ -2,26 +2,19 @@
 // `--lan`: each failure has its own message, with the file, the cause and the fix.
 #include "lan.h"
 
+#include "folder.h"
 #include "unit.h"
 
 #include <signal.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <sysexits.h>
 #include <unistd.h>
 
-static char folder[32];
 static web_settings_t settings;
 static char printed[2048];
-
-static char *path_of(const char *name) {
-    static char path[128];
-    (void)snprintf(path, sizeof path, "%s/%s", folder, name);
-    return path;
-}
 
 static void reset_settings(void) {
     settings = web_settings_standard;
@@ -29,18 +22,12 @@ static void reset_settings(void) {
 }
 
 void setUp(void) {
-    (void)snprintf(folder, sizeof folder, "/tmp/iwheel-lan-XXXXXX");
-    TEST_ASSERT_NOT_NULL(mkdtemp(folder));
+    folder_make();
     reset_settings();
 }
 
 void tearDown(void) {
-    static const char *const names[] = {"lan-key.pem", "lan-key.pem.new", "lan-certificate.pem",
-                                        "lan-certificate.pem.new"};
-    for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
-        (void)remove(path_of(names[i]));
-    }
-    (void)rmdir(folder);
+    folder_remove();
 }
 
 /// Prepares with stderr in a pipe: a limit of the size of files does not apply to it.
@@ -68,11 +55,11 @@ TEST(test_lan_makes_key_and_certificate_once_without_a_message) {
     struct stat found;
     TEST_ASSERT_EQUAL_INT(0, prepare());
     TEST_ASSERT_EQUAL_STRING("", printed);
-    TEST_ASSERT_EQUAL_INT(0, stat(path_of("lan-certificate.pem"), &made));
+    TEST_ASSERT_EQUAL_INT(0, stat(in_folder("lan-certificate.pem"), &made));
     reset_settings();
     TEST_ASSERT_EQUAL_INT(0, prepare());
     TEST_ASSERT_EQUAL_STRING("", printed);
-    TEST_ASSERT_EQUAL_INT(0, stat(path_of("lan-certificate.pem"), &found));
+    TEST_ASSERT_EQUAL_INT(0, stat(in_folder("lan-certificate.pem"), &found));
     TEST_ASSERT_TRUE(made.st_ino == found.st_ino);
 }
 
@@ -102,14 +89,14 @@ TEST(test_lan_on_full_disk_asks_for_room) {
 }
 
 TEST(test_lan_key_that_cannot_be_replaced_is_named_with_its_fix) {
-    TEST_ASSERT_EQUAL_INT(0, mkdir(path_of("lan-key.pem"), 0700));
+    TEST_ASSERT_EQUAL_INT(0, mkdir(in_folder("lan-key.pem"), 0700));
     TEST_ASSERT_EQUAL_INT(EX_CANTCREAT, prepare());
     assert_printed("/lan-key.pem: Is a directory; remove it, and start the bridge again");
 }
 
 TEST(test_lan_bad_certificate_is_replaced_with_a_message) {
     TEST_ASSERT_EQUAL_INT(0, prepare());
-    FILE *file = fopen(path_of("lan-certificate.pem"), "we");
+    FILE *file = fopen(in_folder("lan-certificate.pem"), "we");
     TEST_ASSERT_NOT_NULL(file);
     TEST_ASSERT_TRUE(fputs("no certificate", file) >= 0);
     TEST_ASSERT_EQUAL_INT(0, fclose(file));

@@ -2,10 +2,10 @@
 // A file of the page: compressed for clients that accept it, and not sent again to clients that have it.
 #include "page_file.h"
 
-#include "unity.h"
+#include "folder.h"
+#include "unit.h"
 
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
@@ -13,7 +13,6 @@ static const char hello[] = "hello\n";
 /// Output of `printf 'hello\n' | gzip -9n`.
 static const unsigned char packed[] = {0x1f, 0x8b, 0x08, 0x00, 0x00, 0x00, 0x00, 0x00, 0x02, 0x03, 0xcb, 0x48, 0xcd,
                                        0xc9, 0xc9, 0xe7, 0x02, 0x00, 0x20, 0x30, 0x3a, 0x36, 0x06, 0x00, 0x00, 0x00};
-static char folder[] = "/tmp/iwheel-page-XXXXXX";
 static char path[64];
 static char packed_path[64];
 static page_file_t file;
@@ -27,17 +26,19 @@ static void write_file(const char *name, const void *bytes, size_t length) {
 
 void setUp(void) {
     memset(&file, 0, sizeof file);
+    folder_make();
+    (void)snprintf(path, sizeof path, "%s/page.js", folder);
+    (void)snprintf(packed_path, sizeof packed_path, "%s/page.js.gz", folder);
     write_file(path, hello, sizeof hello - 1U);
     write_file(packed_path, packed, sizeof packed);
 }
 
 void tearDown(void) {
     page_file_free(&file);
-    (void)unlink(path);
-    (void)unlink(packed_path);
+    folder_remove();
 }
 
-static void test_page_file_is_read_with_its_packed_form_and_two_tags(void) {
+TEST(test_page_file_is_read_with_its_packed_form_and_two_tags) {
     TEST_ASSERT_TRUE(page_file_read(&file, path));
     TEST_ASSERT_EQUAL_STRING(hello, file.plain.text);
     TEST_ASSERT_EQUAL_size_t(sizeof packed, file.packed.length);
@@ -46,12 +47,12 @@ static void test_page_file_is_read_with_its_packed_form_and_two_tags(void) {
     TEST_ASSERT_TRUE(strcmp(file.plain.tag, file.packed.tag) != 0);
 }
 
-static void test_page_file_missing_is_refused(void) {
+TEST(test_page_file_missing_is_refused) {
     (void)unlink(path);
     TEST_ASSERT_FALSE(page_file_read(&file, path));
 }
 
-static void test_page_file_packed_form_of_other_bytes_is_ignored(void) {
+TEST(test_page_file_packed_form_of_other_bytes_is_ignored) {
     unsigned char other[sizeof packed];
     for (size_t i = 0; i < 10U; i++) {
         static const size_t at[] = {0, 1, 18, 19, 20, 21, 22, 23, 24, 25};
@@ -71,7 +72,7 @@ static void test_page_file_packed_form_of_other_bytes_is_ignored(void) {
     TEST_ASSERT_EQUAL_PTR(&file.plain, page_file_choose(&file, "gzip"));
 }
 
-static void test_page_file_packed_form_is_chosen_by_accepted_encodings(void) {
+TEST(test_page_file_packed_form_is_chosen_by_accepted_encodings) {
     static const char *const yes[] = {"gzip",    "GZIP",       "deflate, gzip;q=0.5, br",
                                       "br,gzip", "gzip;q=1.0", " gzip ; q=0.001"};
     static const char *const no[] = {"",        "identity",        "gzip;q=0", "gzip;q=0.000, deflate;q=1",
@@ -87,7 +88,7 @@ static void test_page_file_packed_form_is_chosen_by_accepted_encodings(void) {
     TEST_ASSERT_EQUAL_PTR(&file.plain, page_file_choose(&file, NULL));
 }
 
-static void test_page_file_copy_is_recognized_by_its_tag_only(void) {
+TEST(test_page_file_copy_is_recognized_by_its_tag_only) {
     char list[128];
     TEST_ASSERT_TRUE(page_file_read(&file, path));
     (void)snprintf(list, sizeof list, "\"other\", W/%s", file.plain.tag);
@@ -97,19 +98,4 @@ static void test_page_file_copy_is_recognized_by_its_tag_only(void) {
     TEST_ASSERT_FALSE(page_body_is_known(&file.plain, NULL));
     file.plain.tag[0] = '\0';
     TEST_ASSERT_FALSE(page_body_is_known(&file.plain, list));
-}
-
-int main(void) {
-    TEST_ASSERT_NOT_NULL(mkdtemp(folder));
-    (void)snprintf(path, sizeof path, "%s/page.js", folder);
-    (void)snprintf(packed_path, sizeof packed_path, "%s/page.js.gz", folder);
-    UNITY_BEGIN();
-    RUN_TEST(test_page_file_is_read_with_its_packed_form_and_two_tags);
-    RUN_TEST(test_page_file_missing_is_refused);
-    RUN_TEST(test_page_file_packed_form_of_other_bytes_is_ignored);
-    RUN_TEST(test_page_file_packed_form_is_chosen_by_accepted_encodings);
-    RUN_TEST(test_page_file_copy_is_recognized_by_its_tag_only);
-    const int failures = UNITY_END();
-    (void)rmdir(folder);
-    return failures;
 }
