@@ -55,11 +55,18 @@ void tearDown(void) {
     fake_gateway_close(&gateway);
 }
 
+static bridge_lease_result_t ask_arm(const char *name) {
+    return bridge_lease_arm(&lease, name, ARM, (bridge_asker_t){take_answer, NULL}, now_us);
+}
+
+static bridge_lease_result_t drive(const char *key) {
+    return bridge_lease_drive(&lease, key, DRIVE, (bridge_asker_t){take_answer, NULL}, now_us);
+}
+
 /// Arms on the next connection; the reply of the gateway contains `fields`.
 static void arm(const char *name, bool ok, const char *fields) {
     const int connection = gateway.count;
-    TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK,
-                      bridge_lease_arm(&lease, name, ARM, (bridge_asker_t){take_answer, NULL}, now_us));
+    TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK, ask_arm(name));
     step();
     TEST_ASSERT_TRUE(fake_gateway_read(&gateway, connection, line, sizeof line));
     fake_gateway_reply(&gateway, connection, line, ok, fields);
@@ -70,15 +77,14 @@ TEST(test_lease_viewer_has_no_connection) {
     step();
     TEST_ASSERT_EQUAL(0, gateway.count);
     TEST_ASSERT_EQUAL_UINT64(UINT64_MAX, bridge_lease_next_us(&lease, now_us));
-    TEST_ASSERT_EQUAL(BRIDGE_LEASE_WRONG, bridge_lease_drive(&lease, KEY, DRIVE, (bridge_asker_t){NULL, NULL}, now_us));
+    TEST_ASSERT_EQUAL(BRIDGE_LEASE_WRONG, drive(KEY));
 }
 
 TEST(test_one_person_gateway_key_is_sent_in_each_drive) {
     arm("a", true, GRANTED);
     TEST_ASSERT_EQUAL_STRING(KEY, armed_key);
     TEST_ASSERT_EQUAL_STRING("a", bridge_lease_name(&lease));
-    TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK,
-                      bridge_lease_drive(&lease, KEY, DRIVE, (bridge_asker_t){take_answer, NULL}, now_us));
+    TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK, drive(KEY));
     TEST_ASSERT_TRUE(fake_gateway_read(&gateway, 0, line, sizeof line));
     TEST_ASSERT_NOT_NULL(strstr(line, "\"right_mm_s\":100,\"key\":\"00112233445566778899aabbccddeeff\"}"));
 }
@@ -86,8 +92,7 @@ TEST(test_one_person_gateway_key_is_sent_in_each_drive) {
 TEST(test_one_person_without_gateway_key_gets_a_random_key) {
     arm("a", true, ",\"state\":\"armed\"");
     TEST_ASSERT_EQUAL(32, strlen(armed_key));
-    TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK,
-                      bridge_lease_drive(&lease, armed_key, DRIVE, (bridge_asker_t){take_answer, NULL}, now_us));
+    TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK, drive(armed_key));
     TEST_ASSERT_TRUE(fake_gateway_read(&gateway, 0, line, sizeof line));
     TEST_ASSERT_NULL(strstr(line, "key"));
 }
@@ -97,8 +102,7 @@ TEST(test_one_person_other_key_never_drives) {
                                         "00112233445566778899aabbccddeefff"};
     arm("a", true, GRANTED);
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
-        TEST_ASSERT_EQUAL(BRIDGE_LEASE_WRONG,
-                          bridge_lease_drive(&lease, wrong[i], DRIVE, (bridge_asker_t){NULL, NULL}, now_us));
+        TEST_ASSERT_EQUAL(BRIDGE_LEASE_WRONG, drive(wrong[i]));
     }
     TEST_ASSERT_FALSE(fake_gateway_read(&gateway, 0, line, sizeof line));
 }
@@ -115,9 +119,8 @@ TEST(test_one_person_second_is_refused_and_first_drives_on) {
 
 TEST(test_one_person_third_is_busy_while_second_asks) {
     arm("a", true, GRANTED);
-    TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK, bridge_lease_arm(&lease, "b", ARM, (bridge_asker_t){take_answer, NULL}, now_us));
-    TEST_ASSERT_EQUAL(BRIDGE_LEASE_BUSY,
-                      bridge_lease_arm(&lease, "c", ARM, (bridge_asker_t){take_answer, NULL}, now_us));
+    TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK, ask_arm("b"));
+    TEST_ASSERT_EQUAL(BRIDGE_LEASE_BUSY, ask_arm("c"));
     step();
     TEST_ASSERT_EQUAL(2, gateway.count);
 }
@@ -127,14 +130,14 @@ TEST(test_one_person_takeover_ends_the_previous_holder) {
     arm("b", true, ",\"key\":\"ffeeddccbbaa99887766554433221100\"");
     TEST_ASSERT_EQUAL_STRING("b", bridge_lease_name(&lease));
     TEST_ASSERT_TRUE(fake_gateway_is_closed(&gateway, 0));
-    TEST_ASSERT_EQUAL(BRIDGE_LEASE_WRONG, bridge_lease_drive(&lease, KEY, DRIVE, (bridge_asker_t){NULL, NULL}, now_us));
+    TEST_ASSERT_EQUAL(BRIDGE_LEASE_WRONG, drive(KEY));
 }
 
 TEST(test_lease_end_voids_the_key_before_the_connection) {
     arm("a", true, GRANTED);
     bridge_lease_end(&lease, now_us);
     TEST_ASSERT_NULL(bridge_lease_name(&lease));
-    TEST_ASSERT_EQUAL(BRIDGE_LEASE_WRONG, bridge_lease_drive(&lease, KEY, DRIVE, (bridge_asker_t){NULL, NULL}, now_us));
+    TEST_ASSERT_EQUAL(BRIDGE_LEASE_WRONG, drive(KEY));
     TEST_ASSERT_FALSE(fake_gateway_is_closed(&gateway, 0));
     TEST_ASSERT_EQUAL_UINT64(now_us + BRIDGE_ENDING_US, bridge_lease_next_us(&lease, now_us));
     now_us += BRIDGE_ENDING_US;
@@ -153,7 +156,7 @@ TEST(test_lease_ending_connection_frees_its_place_for_arm) {
 }
 
 TEST(test_lease_end_refuses_the_pending_arm) {
-    TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK, bridge_lease_arm(&lease, "a", ARM, (bridge_asker_t){take_answer, NULL}, now_us));
+    TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK, ask_arm("a"));
     step();
     bridge_lease_end(&lease, now_us);
     TEST_ASSERT_EQUAL(1, refused);
@@ -174,8 +177,7 @@ TEST(test_lease_forgotten_asker_gets_no_lease) {
 
 TEST(test_lease_reply_not_holder_ends_the_lease) {
     arm("a", true, GRANTED);
-    TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK,
-                      bridge_lease_drive(&lease, KEY, DRIVE, (bridge_asker_t){take_answer, NULL}, now_us));
+    TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK, drive(KEY));
     TEST_ASSERT_TRUE(fake_gateway_read(&gateway, 0, line, sizeof line));
     fake_gateway_reply(&gateway, 0, line, false, ",\"error\":\"not_holder\",\"message\":\"m\"");
     step();
@@ -187,11 +189,9 @@ TEST(test_lease_reply_not_holder_ends_the_lease) {
 TEST(test_lease_lost_connection_answers_drives_once) {
     arm("a", true, GRANTED);
     for (int i = 0; i < 4; i++) {
-        TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK,
-                          bridge_lease_drive(&lease, KEY, DRIVE, (bridge_asker_t){take_answer, NULL}, now_us));
+        TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK, drive(KEY));
     }
-    TEST_ASSERT_EQUAL(BRIDGE_LEASE_FULL,
-                      bridge_lease_drive(&lease, KEY, DRIVE, (bridge_asker_t){take_answer, NULL}, now_us));
+    TEST_ASSERT_EQUAL(BRIDGE_LEASE_FULL, drive(KEY));
     fake_gateway_hang_up(&gateway, 0);
     step();
     TEST_ASSERT_EQUAL(4, refused);
@@ -199,14 +199,13 @@ TEST(test_lease_lost_connection_answers_drives_once) {
 }
 
 TEST(test_lease_arm_without_reply_is_refused_after_timeout) {
-    TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK, bridge_lease_arm(&lease, "a", ARM, (bridge_asker_t){take_answer, NULL}, now_us));
+    TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK, ask_arm("a"));
     step();
     now_us += BRIDGE_ARM_US;
     step();
     TEST_ASSERT_EQUAL(1, refused);
     fake_gateway_close(&gateway);
-    TEST_ASSERT_EQUAL(BRIDGE_LEASE_AWAY,
-                      bridge_lease_arm(&lease, "a", ARM, (bridge_asker_t){take_answer, NULL}, now_us));
+    TEST_ASSERT_EQUAL(BRIDGE_LEASE_AWAY, ask_arm("a"));
 }
 
 TEST(test_movers_deflected_stick_is_named_for_its_duration) {

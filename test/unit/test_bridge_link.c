@@ -55,13 +55,25 @@ static void step(void) {
     TEST_ASSERT_EQUAL(0, bridge_link_step(&link_, now_us));
 }
 
+static void assert_line(int connection, const char *words) {
+    TEST_ASSERT_TRUE(fake_gateway_read(&gateway, connection, line, sizeof line));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(line, words), line);
+}
+
+static void accept_line(int connection) {
+    fake_gateway_reply(&gateway, connection, line, true, "");
+    step();
+}
+
+static void ask(const char *request) {
+    TEST_ASSERT_TRUE(bridge_link_ask(&link_, request, take_answer, NULL, now_us));
+}
+
 static void connect_both(void) {
     step();
     step();
-    TEST_ASSERT_TRUE(fake_gateway_read(&gateway, WATCHES, line, sizeof line));
-    TEST_ASSERT_NOT_NULL(strstr(line, "\"topics\":[\"state\",\"bus\",\"estop\",\"lease\",\"stop\"],\"rate_hz\":7"));
-    fake_gateway_reply(&gateway, WATCHES, line, true, "");
-    step();
+    assert_line(WATCHES, "\"topics\":[\"state\",\"bus\",\"estop\",\"lease\",\"stop\"],\"rate_hz\":7");
+    accept_line(WATCHES);
     TEST_ASSERT_EQUAL(BRIDGE_LINK_HERE, link_.state);
 }
 
@@ -99,18 +111,16 @@ TEST(test_questions_beyond_four_wait_in_order) {
     for (int i = 0; i < 10; i++) {
         char request[40];
         (void)snprintf(request, sizeof request, "{\"cmd\":\"status\",\"number\":%d}", i);
-        TEST_ASSERT_TRUE(bridge_link_ask(&link_, request, take_answer, NULL, now_us));
+        ask(request);
     }
     TEST_ASSERT_EQUAL_UINT64(now_us, bridge_link_next_us(&link_, now_us));
     step();
     for (int i = 0; i < 10; i++) {
         char number[24];
         (void)snprintf(number, sizeof number, "\"number\":%d}", i);
-        TEST_ASSERT_TRUE(fake_gateway_read(&gateway, WATCHES, line, sizeof line));
-        TEST_ASSERT_NOT_NULL(strstr(line, number));
+        assert_line(WATCHES, number);
         TEST_ASSERT_EQUAL((i < 7) ? 4 : 10 - i, (int)bridge_line_in_flight(&link_.line));
-        fake_gateway_reply(&gateway, WATCHES, line, true, "");
-        step();
+        accept_line(WATCHES);
     }
     TEST_ASSERT_EQUAL(10, answered);
 }
@@ -118,7 +128,7 @@ TEST(test_questions_beyond_four_wait_in_order) {
 TEST(test_question_beyond_the_queue_is_not_accepted) {
     connect_both();
     for (unsigned i = 0; i < BRIDGE_ASKED_MAX; i++) {
-        TEST_ASSERT_TRUE(bridge_link_ask(&link_, "{\"cmd\":\"status\"}", take_answer, NULL, now_us));
+        ask("{\"cmd\":\"status\"}");
     }
     TEST_ASSERT_FALSE(bridge_link_ask(&link_, "{\"cmd\":\"status\"}", take_answer, NULL, now_us));
     step();
@@ -135,7 +145,7 @@ TEST(test_forgotten_question_is_not_sent) {
     for (int i = 0; i < 8; i++) {
         TEST_ASSERT_TRUE(bridge_link_ask(&link_, "{\"cmd\":\"status\"}", take_answer, &who, now_us));
     }
-    TEST_ASSERT_TRUE(bridge_link_ask(&link_, "{\"cmd\":\"why\"}", take_answer, NULL, now_us));
+    ask("{\"cmd\":\"why\"}");
     bridge_link_forget(&link_, &who);
     step();
     TEST_ASSERT_EQUAL(1, read_all(WATCHES));
@@ -143,18 +153,16 @@ TEST(test_forgotten_question_is_not_sent) {
 }
 
 static void assert_stop_is_sent_at_once(void) {
-    TEST_ASSERT_TRUE(bridge_link_ask(&link_, "{\"cmd\":\"stop\"}", take_answer, NULL, now_us));
-    TEST_ASSERT_TRUE(fake_gateway_read(&gateway, STOPS, line, sizeof line)); // No further step is needed.
-    TEST_ASSERT_NOT_NULL(strstr(line, "\"cmd\":\"stop\""));
-    fake_gateway_reply(&gateway, STOPS, line, true, "");
-    step();
+    ask("{\"cmd\":\"stop\"}");
+    assert_line(STOPS, "\"cmd\":\"stop\""); // No further step is needed.
+    accept_line(STOPS);
     TEST_ASSERT_EQUAL(1, answered);
 }
 
 TEST(test_stop_never_waits_for_questions) {
     connect_both();
     for (unsigned i = 0; i < BRIDGE_ASKED_MAX; i++) {
-        TEST_ASSERT_TRUE(bridge_link_ask(&link_, "{\"cmd\":\"status\"}", take_answer, NULL, now_us));
+        ask("{\"cmd\":\"status\"}");
     }
     assert_stop_is_sent_at_once();
 }
@@ -162,26 +170,23 @@ TEST(test_stop_never_waits_for_questions) {
 TEST(test_stop_never_queues_behind_stops) {
     connect_both();
     for (int i = 0; i < 300; i++) {
-        TEST_ASSERT_TRUE(bridge_link_ask(&link_, "{\"cmd\":\"stop\"}", take_answer, NULL, now_us));
+        ask("{\"cmd\":\"stop\"}");
     }
-    TEST_ASSERT_TRUE(bridge_link_ask(&link_, "{\"cmd\":\"estop\",\"reason\":\"a\"}", take_answer, NULL, now_us));
+    ask("{\"cmd\":\"estop\",\"reason\":\"a\"}");
     TEST_ASSERT_TRUE(fake_gateway_read(&gateway, STOPS, line, sizeof line));
     fake_gateway_reply(&gateway, STOPS, line, true, "");
-    TEST_ASSERT_TRUE(fake_gateway_read(&gateway, STOPS, line, sizeof line));
-    TEST_ASSERT_NOT_NULL(strstr(line, "\"cmd\":\"estop\""));
-    fake_gateway_reply(&gateway, STOPS, line, true, "");
-    step();
+    assert_line(STOPS, "\"cmd\":\"estop\"");
+    accept_line(STOPS);
     TEST_ASSERT_EQUAL(2, answered); // A stop that was already sent does not answer later requests.
     TEST_ASSERT_EQUAL(1, read_all(STOPS));
-    fake_gateway_reply(&gateway, STOPS, line, true, "");
-    step();
+    accept_line(STOPS);
     TEST_ASSERT_EQUAL(301, answered);
     TEST_ASSERT_EQUAL(0, refused);
 }
 
 TEST(test_stop_without_reply_is_reported_and_reconnects) {
     connect_both();
-    TEST_ASSERT_TRUE(bridge_link_ask(&link_, "{\"cmd\":\"stop\"}", take_answer, NULL, now_us));
+    ask("{\"cmd\":\"stop\"}");
     now_us += BRIDGE_STOP_US - 1U;
     step();
     TEST_ASSERT_EQUAL(0, refused);
@@ -201,10 +206,9 @@ TEST(test_stop_on_lost_connection_connects_immediately) {
     fake_gateway_hang_up(&gateway, STOPS);
     step();
     TEST_ASSERT_EQUAL(BRIDGE_AWAY, link_.stop.line.state);
-    TEST_ASSERT_TRUE(bridge_link_ask(&link_, "{\"cmd\":\"estop\"}", take_answer, NULL, now_us));
+    ask("{\"cmd\":\"estop\"}");
     step();
-    TEST_ASSERT_TRUE(fake_gateway_read(&gateway, 2, line, sizeof line));
-    TEST_ASSERT_NOT_NULL(strstr(line, "\"cmd\":\"estop\""));
+    assert_line(2, "\"cmd\":\"estop\"");
 }
 
 TEST(test_stop_without_gateway_is_not_accepted) {
@@ -222,7 +226,7 @@ TEST(test_link_gateway_without_greeting_times_out) {
     step();
     step();
     TEST_ASSERT_NOT_EQUAL(BRIDGE_LINK_HERE, link_.state);
-    TEST_ASSERT_TRUE(bridge_link_ask(&link_, "{\"cmd\":\"stop\"}", take_answer, NULL, now_us));
+    ask("{\"cmd\":\"stop\"}");
     now_us += BRIDGE_STOP_US;
     step();
     TEST_ASSERT_EQUAL(1, refused);
@@ -254,7 +258,7 @@ TEST(test_stop_after_timeout_is_not_sent_late) {
         count++;
         TEST_ASSERT_LESS_THAN(FAKE_CONNECTIONS - 4, count);
     }
-    TEST_ASSERT_TRUE(bridge_link_ask(&link_, "{\"cmd\":\"stop\"}", take_answer, NULL, now_us));
+    ask("{\"cmd\":\"stop\"}");
     now_us += BRIDGE_STOP_US;
     (void)bridge_link_step(&link_, now_us);
     TEST_ASSERT_EQUAL(1, refused);
@@ -280,10 +284,9 @@ TEST(test_stop_needs_no_greeting) {
     fake_gateway_hang_up(&gateway, STOPS);
     step();
     const int next = gateway.count;
-    TEST_ASSERT_TRUE(bridge_link_ask(&link_, "{\"cmd\":\"estop\"}", take_answer, NULL, now_us));
+    ask("{\"cmd\":\"estop\"}");
     fake_gateway_accept(&gateway);
-    TEST_ASSERT_TRUE(fake_gateway_read(&gateway, next, line, sizeof line)); // On a new connection, also without a step.
-    TEST_ASSERT_NOT_NULL(strstr(line, "\"cmd\":\"estop\""));
+    assert_line(next, "\"cmd\":\"estop\""); // On a new connection, also without a step.
     TEST_ASSERT_EQUAL(0, refused);
 }
 
@@ -357,7 +360,7 @@ TEST(test_link_clock_of_a_gateway_on_this_machine_is_the_same) {
 TEST(test_link_lost_gateway_answers_each_question_once) {
     connect_both();
     for (int i = 0; i < 9; i++) {
-        TEST_ASSERT_TRUE(bridge_link_ask(&link_, "{\"cmd\":\"status\"}", take_answer, NULL, now_us));
+        ask("{\"cmd\":\"status\"}");
     }
     step();
     fake_gateway_send(&gateway, WATCHES, "{\"event\":\"state\",\"t_us\":5}");
@@ -371,8 +374,7 @@ TEST(test_link_lost_gateway_answers_each_question_once) {
     step();
     step();
     TEST_ASSERT_TRUE(fake_gateway_read(&gateway, 2, line, sizeof line));
-    fake_gateway_reply(&gateway, 2, line, true, "");
-    step();
+    accept_line(2);
     TEST_ASSERT_EQUAL(2, here);
     TEST_ASSERT_FALSE(fake_gateway_read(&gateway, 2, line, sizeof line)); // No question is sent twice.
 }
@@ -386,10 +388,8 @@ TEST(test_rate_change_is_asked_once) {
     bridge_link_rate(&link_, 2, now_us);
     TEST_ASSERT_EQUAL_UINT64(now_us, bridge_link_next_us(&link_, now_us));
     step();
-    TEST_ASSERT_TRUE(fake_gateway_read(&gateway, WATCHES, line, sizeof line));
-    TEST_ASSERT_NOT_NULL(strstr(line, "\"topics\":[\"state\",\"bus\",\"estop\",\"lease\",\"stop\"],\"rate_hz\":2"));
-    fake_gateway_reply(&gateway, WATCHES, line, true, "");
-    step();
+    assert_line(WATCHES, "\"topics\":[\"state\",\"bus\",\"estop\",\"lease\",\"stop\"],\"rate_hz\":2");
+    accept_line(WATCHES);
     TEST_ASSERT_EQUAL(0, read_all(WATCHES));
     TEST_ASSERT_EQUAL(1, here);
 }
@@ -410,23 +410,18 @@ TEST(test_rate_change_while_away_is_subscribed) {
     bridge_link_rate(&link_, 3, now_us);
     step();
     step();
-    TEST_ASSERT_TRUE(fake_gateway_read(&gateway, WATCHES, line, sizeof line));
-    TEST_ASSERT_NOT_NULL(strstr(line, "\"rate_hz\":3"));
-    fake_gateway_reply(&gateway, WATCHES, line, true, "");
-    step();
+    assert_line(WATCHES, "\"rate_hz\":3");
+    accept_line(WATCHES);
     TEST_ASSERT_EQUAL(0, read_all(WATCHES));
 }
 
 TEST(test_rate_change_while_subscribing_is_asked_later) {
     step();
     step();
-    TEST_ASSERT_TRUE(fake_gateway_read(&gateway, WATCHES, line, sizeof line));
-    TEST_ASSERT_NOT_NULL(strstr(line, "\"rate_hz\":7"));
+    assert_line(WATCHES, "\"rate_hz\":7");
     bridge_link_rate(&link_, 2, now_us); // The gateway has only the old rate.
-    fake_gateway_reply(&gateway, WATCHES, line, true, "");
-    step();
+    accept_line(WATCHES);
     bridge_link_rate(&link_, 2, now_us);
     step();
-    TEST_ASSERT_TRUE(fake_gateway_read(&gateway, WATCHES, line, sizeof line));
-    TEST_ASSERT_NOT_NULL(strstr(line, "\"rate_hz\":2"));
+    assert_line(WATCHES, "\"rate_hz\":2");
 }

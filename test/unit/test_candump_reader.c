@@ -33,6 +33,12 @@ static void end_input(void) {
     ends[1] = -1;
 }
 
+/// The whole input is this text.
+static void read_all(const char *text) {
+    read_text(text);
+    end_input();
+}
+
 static void expect_frame(uint32_t id, uint64_t line) {
     candump_t frame;
     TEST_ASSERT_EQUAL(CANDUMP_READ_FRAME, candump_reader_next(&reader, &frame));
@@ -54,8 +60,7 @@ static void expect_end(void) {
 }
 
 TEST(test_reader_byte_order_mark_is_skipped) {
-    read_text("\xef\xbb\xbf(1.0) can0 100#00\n(1.1) can0 120#00\n");
-    end_input();
+    read_all("\xef\xbb\xbf(1.0) can0 100#00\n(1.1) can0 120#00\n");
     expect_frame(0x100, 1);
     expect_frame(0x120, 2);
     expect_end();
@@ -63,8 +68,7 @@ TEST(test_reader_byte_order_mark_is_skipped) {
 
 TEST(test_reader_foreign_format_is_reported_once) {
     candump_t frame;
-    read_text("date Tue Nov 14 22:13:20 2023\nbase hex  timestamps absolute\n0.0 1 10A Rx d 0\n");
-    end_input();
+    read_all("date Tue Nov 14 22:13:20 2023\nbase hex  timestamps absolute\n0.0 1 10A Rx d 0\n");
     TEST_ASSERT_EQUAL(CANDUMP_READ_FOREIGN, candump_reader_next(&reader, &frame));
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reader.why, "asc2log"), reader.why);
     expect_end();
@@ -86,8 +90,7 @@ TEST(test_reader_frame_line_is_never_a_foreign_format) {
 }
 
 TEST(test_reader_lines_are_returned_with_their_numbers) {
-    read_text("(1.0) can0 100#00\r\n\n# comment\n(1.1) can0 120#00\nrubbish\n(1.2) can0 200#\n");
-    end_input();
+    read_all("(1.0) can0 100#00\r\n\n# comment\n(1.1) can0 120#00\nrubbish\n(1.2) can0 200#\n");
     expect_frame(0x100, 1);
     expect_frame(0x120, 4);
     expect_bad(5, "time in parentheses");
@@ -110,16 +113,14 @@ TEST(test_reader_line_is_returned_before_the_input_ends) {
 }
 
 TEST(test_reader_last_line_without_newline_is_bad) {
-    read_text("(1.0) can0 100#0011\n(1.1) can0 100#00");
-    end_input();
+    read_all("(1.0) can0 100#0011\n(1.1) can0 100#00");
     expect_frame(0x100, 1);
     expect_bad(2, "may be cut");
     expect_end();
 }
 
 TEST(test_reader_blank_rest_is_ignored) {
-    read_text("(1.0) can0 100#0011\n \t");
-    end_input();
+    read_all("(1.0) can0 100#0011\n \t");
     expect_frame(0x100, 1);
     expect_end();
 }
@@ -131,8 +132,7 @@ TEST(test_reader_overlong_line_is_bad_and_the_next_is_read) {
     read_text("(1.0) can0 100#00\n");
     give_bytes(long_line, sizeof long_line);
     give_bytes(long_line, sizeof long_line);
-    read_text("(1.1) can0 101#00\n");
-    end_input();
+    read_all("(1.1) can0 101#00\n");
     expect_frame(0x100, 1);
     expect_bad(2, "longer than any frame");
     expect_bad(3, "longer than any frame");

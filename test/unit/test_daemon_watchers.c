@@ -6,7 +6,6 @@
 
 #include "unit.h"
 
-#include <errno.h>
 #include <string.h>
 #include <sys/resource.h>
 #include <sys/socket.h>

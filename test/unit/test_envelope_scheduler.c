@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 /// The envelope and the scheduler are independent: the envelope must pass every pair that the scheduler makes of
 /// commands and times.
-#include <string.h>
 
 #include "iwheel/codec.h"
 #include "iwheel/private/setpoint.h"

@@ -80,6 +80,12 @@ static void put_file(const char *name, const char *content) {
     (void)fclose(file);
 }
 
+/// Writes the text and waits for the result.
+static void write_text(const char *text, gw_file_store_news_t expected) {
+    TEST_ASSERT_TRUE(gw_file_store_write(&store, text, strlen(text)));
+    TEST_ASSERT_EQUAL_INT(expected, next_news());
+}
+
 static void assert_file(const char *name, const char *content) {
     char found[64] = "";
     FILE *file = fopen(in_folder(name), "r");
@@ -100,8 +106,7 @@ TEST(test_file_store_writes_reads_back_and_sets_aside) {
     TEST_ASSERT_EQUAL_UINT(3, length);
     TEST_ASSERT_EQUAL_MEMORY("one", reply, 3);
     gw_file_store_set_aside(&store);
-    TEST_ASSERT_TRUE(gw_file_store_write(&store, "two", 3));
-    TEST_ASSERT_EQUAL_INT(GW_FILE_STORE_WRITTEN, next_news());
+    write_text("two", GW_FILE_STORE_WRITTEN);
     assert_file("file.damaged", "one");
     assert_file("file", "two");
     TEST_ASSERT_EQUAL_INT(-1, access(in_folder("file.new"), F_OK));
@@ -113,12 +118,10 @@ TEST(test_file_store_without_directory_fails_until_it_exists) {
     (void)snprintf(missing, sizeof missing, "%s/later", folder);
     open_store(missing, GW_FILE_STORE_FAILED);
     TEST_ASSERT_EQUAL_INT(ENOENT, error);
-    TEST_ASSERT_TRUE(gw_file_store_write(&store, "one", 3));
-    TEST_ASSERT_EQUAL_INT(GW_FILE_STORE_FAILED, next_news());
+    write_text("one", GW_FILE_STORE_FAILED);
     TEST_ASSERT_EQUAL_INT(ENOENT, error);
     TEST_ASSERT_EQUAL_INT(0, mkdir(missing, 0700));
-    TEST_ASSERT_TRUE(gw_file_store_write(&store, "two", 3));
-    TEST_ASSERT_EQUAL_INT(GW_FILE_STORE_WRITTEN, next_news());
+    write_text("two", GW_FILE_STORE_WRITTEN);
     assert_file("later/file", "two");
     gw_file_store_close(&store);
 }
@@ -127,8 +130,7 @@ TEST(test_file_store_refuses_link_pipe_and_too_large_file) {
     put_file("other", "precious");
     TEST_ASSERT_EQUAL_INT(0, symlink("other", in_folder("file")));
     open_store(folder, GW_FILE_STORE_BAD);
-    TEST_ASSERT_TRUE(gw_file_store_write(&store, "new", 3));
-    TEST_ASSERT_EQUAL_INT(GW_FILE_STORE_WRITTEN, next_news());
+    write_text("new", GW_FILE_STORE_WRITTEN);
     assert_file("other", "precious");
     assert_file("file", "new");
     gw_file_store_close(&store);
@@ -148,8 +150,7 @@ TEST(test_file_store_failed_write_retains_the_old_file) {
     put_file("file", "old");
     TEST_ASSERT_EQUAL_INT(0, mkdir(in_folder("file.new"), 0755));
     open_store(folder, GW_FILE_STORE_READ);
-    TEST_ASSERT_TRUE(gw_file_store_write(&store, "new", 3));
-    TEST_ASSERT_EQUAL_INT(GW_FILE_STORE_FAILED, next_news());
+    write_text("new", GW_FILE_STORE_FAILED);
     assert_file("file", "old");
     gw_file_store_close(&store);
 }
@@ -159,16 +160,14 @@ TEST(test_file_store_reports_failed_fsync_and_rename) {
     fsync_error = EIO;
     open_store(folder, GW_FILE_STORE_READ);
     fsync_error = 0;
-    TEST_ASSERT_TRUE(gw_file_store_write(&store, "new", 3));
-    TEST_ASSERT_EQUAL_INT(GW_FILE_STORE_FAILED, next_news());
+    write_text("new", GW_FILE_STORE_FAILED);
     TEST_ASSERT_EQUAL_INT(EIO, error);
     assert_file("file", "old");
     gw_file_store_close(&store);
     (void)unlink(in_folder("file"));
     open_store(folder, GW_FILE_STORE_ABSENT);
     TEST_ASSERT_EQUAL_INT(0, mkdir(in_folder("file"), 0700));
-    TEST_ASSERT_TRUE(gw_file_store_write(&store, "new", 3));
-    TEST_ASSERT_EQUAL_INT(GW_FILE_STORE_FAILED, next_news());
+    write_text("new", GW_FILE_STORE_FAILED);
     TEST_ASSERT_EQUAL_INT(EISDIR, error);
     TEST_ASSERT_EQUAL_INT(-1, access(in_folder("file.new"), F_OK));
     gw_file_store_close(&store);
@@ -179,13 +178,11 @@ TEST(test_file_store_never_writes_into_an_existing_file) {
     put_file("other", "precious");
     name_again("other", "file.new");
     open_store(folder, GW_FILE_STORE_READ);
-    TEST_ASSERT_TRUE(gw_file_store_write(&store, "new", 3));
-    TEST_ASSERT_EQUAL_INT(GW_FILE_STORE_WRITTEN, next_news());
+    write_text("new", GW_FILE_STORE_WRITTEN);
     assert_file("other", "precious");
     assert_file("file", "new");
     TEST_ASSERT_EQUAL_INT(0, symlink("other", in_folder("file.new")));
-    TEST_ASSERT_TRUE(gw_file_store_write(&store, "newer", 5));
-    TEST_ASSERT_EQUAL_INT(GW_FILE_STORE_WRITTEN, next_news());
+    write_text("newer", GW_FILE_STORE_WRITTEN);
     assert_file("other", "precious");
     gw_file_store_close(&store);
 }
@@ -244,8 +241,7 @@ TEST(test_file_store_refuses_file_with_second_name_or_other_owner) {
 static void assert_no_folder(const char *path, int why) {
     open_store(path, GW_FILE_STORE_FAILED);
     TEST_ASSERT_EQUAL_INT(why, error);
-    TEST_ASSERT_TRUE(gw_file_store_write(&store, "new", 3));
-    TEST_ASSERT_EQUAL_INT(GW_FILE_STORE_FAILED, next_news());
+    write_text("new", GW_FILE_STORE_FAILED);
     TEST_ASSERT_EQUAL_INT(why, error);
     gw_file_store_close(&store);
 }

@@ -3,7 +3,6 @@
 
 #include "unit.h"
 #include <stdlib.h>
-#include <string.h>
 
 static blackbox_ring_t *ring;
 static gw_tape_t tape;

@@ -21,7 +21,6 @@ static void expect(const char *text) {
 }
 
 TEST(test_json_control_characters_and_invalid_utf8_are_escaped) {
-    iwn_out_init(&json, line, sizeof line);
     iwn_out_open(&json, NULL, '{');
     iwn_out_text(&json, "t", "\x1b[2J\xC2\x9B\xE2\x80\xAE\xE2\x80\xA8\xD8\x9C\xE2\x81\xA9\x9B\xE2\x82\xAC\xE2\x82");
     iwn_out_close(&json, '}');
@@ -31,7 +30,6 @@ TEST(test_json_control_characters_and_invalid_utf8_are_escaped) {
 }
 
 TEST(test_json_members_are_escaped_and_separated) {
-    iwn_out_init(&json, line, sizeof line);
     iwn_out_open(&json, NULL, '{');
     iwn_out_int(&json, "low", INT64_MIN);
     iwn_out_text(&json, "t", "a\"b\\c\n\x7f\xE2\x82\xAC");
@@ -141,8 +139,8 @@ TEST(test_json_text_beyond_ascii_is_unchanged) {
     expect("\"t\":\"a\xC3\xA9\xE2\x82\xAC\xF0\x9F\x98\x80 12345678 \xC3\xA9\"");
 }
 
-TEST(test_json_elements_need_exactly_their_length) {
-    char whole[512];
+/// Writes an object with an element of each kind. Returns the length of the line.
+static size_t write_elements(void) {
     iwn_out_open(&json, NULL, '{');
     iwn_out_int(&json, "int", -1234567);
     iwn_out_bool(&json, "yes", true);
@@ -151,20 +149,17 @@ TEST(test_json_elements_need_exactly_their_length) {
     iwn_out_null(&json, "null");
     iwn_out_span(&json, iwn_span("whole"), iwn_span("{\"a\":[1,2]}"));
     iwn_out_close(&json, '}');
-    const size_t length = iwn_out_finish(&json);
+    return iwn_out_finish(&json);
+}
+
+TEST(test_json_elements_need_exactly_their_length) {
+    char whole[512];
+    const size_t length = write_elements();
     memcpy(whole, line, length);
     for (size_t size = 1; size <= length + 1U; size++) {
         memset(line, 0x5A, sizeof line);
         iwn_out_init(&json, line, size);
-        iwn_out_open(&json, NULL, '{');
-        iwn_out_int(&json, "int", -1234567);
-        iwn_out_bool(&json, "yes", true);
-        iwn_out_text(&json, "text", "plain");
-        iwn_out_text(&json, "escaped", "a\n\"b\xFF");
-        iwn_out_null(&json, "null");
-        iwn_out_span(&json, iwn_span("whole"), iwn_span("{\"a\":[1,2]}"));
-        iwn_out_close(&json, '}');
-        TEST_ASSERT_EQUAL_UINT((size > length) ? length : 0U, iwn_out_finish(&json));
+        TEST_ASSERT_EQUAL_UINT((size > length) ? length : 0U, write_elements());
         TEST_ASSERT_EQUAL_HEX8(0x5A, line[size]);
     }
     TEST_ASSERT_EQUAL_STRING_LEN(whole, line, length);

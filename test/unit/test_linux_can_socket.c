@@ -8,7 +8,6 @@
 #include <fcntl.h>
 #include <linux/can/raw.h>
 #include <string.h>
-#include <unistd.h>
 
 #define ASKED_MAX 16U
 

@@ -75,6 +75,17 @@ static int pressed(void) {
     return iwl_gpio_estop_ops->pressed(&store, wire.edges == 0);
 }
 
+static void assert_pressed_after(unsigned after_ms, int expected) {
+    poll_after(after_ms);
+    TEST_ASSERT_EQUAL_INT(expected, pressed());
+}
+
+/// The line changes to this level, with an edge.
+static void change_level(int level) {
+    wire.level = level;
+    wire.edges = 1;
+}
+
 static void begin(bool active_high) {
     const iwl_estop_config_t config = {.name = "ESTOP", .active_high = active_high, .debounce_ms = 5};
     wire.level = active_high ? 0 : 1;
@@ -94,29 +105,21 @@ void tearDown(void) {
 
 TEST(test_estop_line_low_is_pressed_and_high_is_released) {
     TEST_ASSERT_EQUAL_INT(0, pressed());
-    wire.level = 0;
-    wire.edges = 1;
-    poll_after(1);
-    TEST_ASSERT_EQUAL_INT(1, pressed());
-    poll_after(100);
-    TEST_ASSERT_EQUAL_INT(1, pressed());
-    wire.level = 1;
-    wire.edges = 1;
-    poll_after(1);
-    TEST_ASSERT_EQUAL_INT(1, pressed());
+    change_level(0);
+    assert_pressed_after(1, 1);
+    assert_pressed_after(100, 1);
+    change_level(1);
+    assert_pressed_after(1, 1);
     TEST_ASSERT_EQUAL_UINT64(now_us + 5U * MS, iwl_gpio_estop_ops->next_us(&store));
-    poll_after(5);
-    TEST_ASSERT_EQUAL_INT(0, pressed());
+    assert_pressed_after(5, 0);
 }
 
 TEST(test_estop_line_active_high_is_pressed_when_high) {
     tearDown();
     begin(true);
     TEST_ASSERT_EQUAL_INT(0, pressed());
-    wire.level = 1;
-    wire.edges = 1;
-    poll_after(1);
-    TEST_ASSERT_EQUAL_INT(1, pressed());
+    change_level(1);
+    assert_pressed_after(1, 1);
 }
 
 TEST(test_estop_level_is_read_without_a_report_of_the_wait) {
@@ -129,34 +132,28 @@ TEST(test_estop_level_is_read_without_a_report_of_the_wait) {
 TEST(test_estop_pulse_with_only_its_edges_left_is_a_press) {
     TEST_ASSERT_EQUAL_INT(0, pressed());
     wire.edges = 2;
-    poll_after(1);
-    TEST_ASSERT_EQUAL_INT(1, pressed());
-    poll_after(5);
-    TEST_ASSERT_EQUAL_INT(0, pressed());
+    assert_pressed_after(1, 1);
+    assert_pressed_after(5, 0);
 }
 
 TEST(test_estop_chip_lost_is_unreadable_by_level_and_by_edges) {
     wire.level = -1;
-    poll_after(1);
-    TEST_ASSERT_EQUAL_INT(-1, pressed());
+    assert_pressed_after(1, -1);
     TEST_ASSERT_EQUAL_INT(ENODEV, iwl_gpio_estop_ops->trouble(&store));
     wire.level = 1;
     poll_after(200);
     (void)pressed();
     TEST_ASSERT_EQUAL_INT(0, pressed());
     wire.edges = -1;
-    poll_after(1);
-    TEST_ASSERT_EQUAL_INT(-1, pressed());
+    assert_pressed_after(1, -1);
 }
 
 TEST(test_estop_chip_lost_and_back_is_released_again) {
     wire.level = -1;
-    poll_after(1);
-    TEST_ASSERT_EQUAL_INT(-1, pressed());
+    assert_pressed_after(1, -1);
     TEST_ASSERT_EQUAL_INT(-1, pressed());
     wire.level = 1;
-    poll_after(200);
-    TEST_ASSERT_EQUAL_INT(0, pressed());
+    assert_pressed_after(200, 0);
     TEST_ASSERT_EQUAL_INT(0, iwl_gpio_estop_ops->trouble(&store));
 }
 
@@ -167,8 +164,7 @@ TEST(test_estop_lost_chip_is_retried_every_200_ms) {
     wire.open_error = ENOENT;
     wire.opened = 0;
     for (unsigned ms = 0; ms < 1000U; ms++) {
-        poll_after(1);
-        TEST_ASSERT_EQUAL_INT(-1, pressed());
+        assert_pressed_after(1, -1);
         TEST_ASSERT_TRUE(iwl_gpio_estop_ops->next_us(&store) > now_us);
         TEST_ASSERT_TRUE(iwl_gpio_estop_ops->next_us(&store) <= now_us + 200U * MS);
     }
@@ -183,8 +179,7 @@ TEST(test_estop_line_busy_at_start_is_unreadable_until_it_opens) {
     TEST_ASSERT_EQUAL_INT(-1, pressed());
     TEST_ASSERT_EQUAL_INT(EBUSY, iwl_gpio_estop_ops->trouble(&store));
     wire.open_error = 0;
-    poll_after(200);
-    TEST_ASSERT_EQUAL_INT(0, pressed());
+    assert_pressed_after(200, 0);
     TEST_ASSERT_EQUAL_UINT64(IW_NEVER, iwl_gpio_estop_ops->next_us(&store));
 }
 
@@ -194,8 +189,7 @@ TEST(test_estop_line_with_another_name_counts_as_pressed) {
     begin(false);
     TEST_ASSERT_EQUAL_INT(-1, pressed());
     TEST_ASSERT_EQUAL_INT(EREMCHG, iwl_gpio_estop_ops->trouble(&store));
-    poll_after(1000);
-    TEST_ASSERT_EQUAL_INT(-1, pressed());
+    assert_pressed_after(1000, -1);
 }
 
 TEST(test_estop_line_has_names_while_it_is_readable) {

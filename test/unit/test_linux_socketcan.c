@@ -44,6 +44,18 @@ static iw_bus_state_t state(void) {
     return iwl_bus_state(&store);
 }
 
+static void assert_state_after_ms(unsigned ms, iw_bus_state_t expected) {
+    wait_ms(ms);
+    TEST_ASSERT_EQUAL_INT(expected, state());
+}
+
+/// The interface is set down, and the port notices it.
+static void set_down(void) {
+    fake_interface.ours.error = ENETDOWN;
+    fake_interface.presence = IWL_LINK_DOWN;
+    wait_ms(1);
+}
+
 static int receive(iw_can_frame_t *out_frame) {
     return iwl_bus_receive(&store, out_frame);
 }
@@ -56,6 +68,12 @@ static unsigned drain(void) {
         count++;
     }
     return count;
+}
+
+static void assert_received_after_ms(unsigned ms, int expected) {
+    iw_can_frame_t frame;
+    wait_ms(ms);
+    TEST_ASSERT_EQUAL_INT(expected, receive(&frame));
 }
 
 static int send_setpoint(void) {
@@ -81,8 +99,7 @@ void tearDown(void) {
 TEST(test_socketcan_bus_off_and_restart_in_one_batch_report_once) {
     fake_interface_put_error(CAN_ERR_BUSOFF, 0, 0);
     fake_interface_put_error(CAN_ERR_RESTARTED, 0, 0);
-    wait_ms(1);
-    TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, state());
+    assert_state_after_ms(1, IW_BUS_OFF);
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state());
 }
 
@@ -105,8 +122,7 @@ TEST(test_socketcan_sends_nothing_before_a_bus_off_is_reported) {
     }
     fake_interface_put_error(CAN_ERR_BUSOFF, 0, 0);
     fake_interface_put_error(CAN_ERR_RESTARTED, 0, 0);
-    wait_ms(1);
-    TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state()); // Both error frames are in the second batch.
+    assert_state_after_ms(1, IW_BUS_ACTIVE); // Both error frames are in the second batch.
     (void)drain();
     TEST_ASSERT_EQUAL_INT(0, send_setpoint());
     TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, state());
@@ -115,8 +131,7 @@ TEST(test_socketcan_sends_nothing_before_a_bus_off_is_reported) {
 
 TEST(test_socketcan_restart_reports_a_missed_bus_off) {
     fake_interface_put_error(CAN_ERR_RESTARTED, 0, 0);
-    wait_ms(1);
-    TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, state());
+    assert_state_after_ms(1, IW_BUS_OFF);
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state());
 }
 
@@ -128,8 +143,7 @@ TEST(test_socketcan_bus_off_is_reported_until_the_carrier_returns) {
     wait_ms(200);
     TEST_ASSERT_EQUAL_UINT64_MESSAGE(now_us + 200000U, iwl_bus_next_us(&store), "seen");
     for (unsigned i = 0; i < 100U; i++) {
-        wait_ms(20);
-        TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, state());
+        assert_state_after_ms(20, IW_BUS_OFF);
     }
     fake_interface.carrier = 1; // The error frame of the restart was lost.
     wait_ms(200);
@@ -151,34 +165,28 @@ TEST(test_socketcan_forged_recovery_is_ignored) {
     fake_interface_put_error(CAN_ERR_BUSOFF, 0, 0);
     fake_interface_put_error(CAN_ERR_RESTARTED, 0, MSG_DONTROUTE);
     fake_interface_put_error(CAN_ERR_CRTL, CAN_ERR_CRTL_ACTIVE, MSG_DONTROUTE);
-    wait_ms(1);
-    TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, state());
+    assert_state_after_ms(1, IW_BUS_OFF);
     TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, state());
 }
 
 TEST(test_socketcan_active_frame_ends_passive_but_not_bus_off) {
     fake_interface_put_error(CAN_ERR_CRTL, CAN_ERR_CRTL_TX_PASSIVE, 0);
-    wait_ms(1);
-    TEST_ASSERT_EQUAL_INT(IW_BUS_PASSIVE, state());
+    assert_state_after_ms(1, IW_BUS_PASSIVE);
     TEST_ASSERT_EQUAL_INT(IW_BUS_PASSIVE, state());
     (void)drain();
     fake_interface_put_error(CAN_ERR_CRTL, CAN_ERR_CRTL_ACTIVE, 0);
-    wait_ms(1);
-    TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state());
+    assert_state_after_ms(1, IW_BUS_ACTIVE);
     (void)drain();
     fake_interface.carrier = 0;
     fake_interface_put_error(CAN_ERR_BUSOFF, 0, 0);
     fake_interface_put_error(CAN_ERR_CRTL, CAN_ERR_CRTL_ACTIVE, 0);
-    wait_ms(1);
-    TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, state());
+    assert_state_after_ms(1, IW_BUS_OFF);
     TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, state());
 }
 
 TEST(test_socketcan_frames_from_before_link_down_are_dropped) {
     iw_can_frame_t frame;
-    fake_interface.ours.error = ENETDOWN;
-    fake_interface.presence = IWL_LINK_DOWN;
-    wait_ms(1);
+    set_down();
     TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, state());
     fake_interface_put(&fake_interface.ours, 256, 4, 0);
     fake_interface_put(&fake_interface.others, 0x700, 4, 0);
@@ -192,9 +200,7 @@ TEST(test_socketcan_frames_from_before_link_down_are_dropped) {
 }
 
 TEST(test_socketcan_frames_during_the_link_check_are_dropped) {
-    fake_interface.ours.error = ENETDOWN;
-    fake_interface.presence = IWL_LINK_DOWN;
-    wait_ms(1);
+    set_down();
     fake_interface.presence = IWL_LINK_UP;
     fake_interface.news = true;
     fake_interface.late = 40;
@@ -205,9 +211,7 @@ TEST(test_socketcan_frames_during_the_link_check_are_dropped) {
 }
 
 TEST(test_socketcan_frames_while_the_link_is_down_are_drained) {
-    fake_interface.ours.error = ENETDOWN;
-    fake_interface.presence = IWL_LINK_DOWN;
-    wait_ms(1);
+    set_down();
     fake_interface_put(&fake_interface.ours, 256, 4, 0);
     fake_interface_put(&fake_interface.others, 0x700, 4, 0);
     wait_ms(1);
@@ -220,8 +224,7 @@ TEST(test_socketcan_half_read_batch_is_dropped_at_link_down) {
     for (unsigned i = 0; i < 20U; i++) {
         fake_interface_put(&fake_interface.ours, 256, 4, 0);
     }
-    wait_ms(1);
-    TEST_ASSERT_EQUAL_INT(1, receive(&frame));
+    assert_received_after_ms(1, 1);
     fake_interface.send_result = -1;
     TEST_ASSERT_EQUAL_INT(-1, send_setpoint());
     TEST_ASSERT_TRUE(receive(&frame) < 0);
@@ -242,8 +245,7 @@ TEST(test_socketcan_link_down_and_up_between_polls_reports_once) {
 TEST(test_socketcan_recreated_interface_gets_new_sockets) {
     fake_interface.ours.error = ENODEV;
     fake_interface.presence = IWL_LINK_ABSENT;
-    wait_ms(1);
-    TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, state());
+    assert_state_after_ms(1, IW_BUS_DOWN);
     TEST_ASSERT_EQUAL_INT(-1, send_setpoint());
     fake_interface.presence = IWL_LINK_UP;
     fake_interface.index = 4;
@@ -263,14 +265,11 @@ TEST(test_socketcan_recreated_same_index_gets_new_sockets) {
 
 TEST(test_socketcan_link_up_in_bus_off_waits_for_the_carrier) {
     fake_interface.ours.error = ENETDOWN;
-    wait_ms(1);
-    TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, state());
+    assert_state_after_ms(1, IW_BUS_DOWN);
     fake_interface.state = IW_BUS_OFF;
     fake_interface.carrier = 0;
-    wait_ms(200);
-    TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, state());
-    wait_ms(200);
-    TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, state());
+    assert_state_after_ms(200, IW_BUS_OFF);
+    assert_state_after_ms(200, IW_BUS_OFF);
     fake_interface.carrier = 1;
     wait_ms(200);
     (void)state();
@@ -282,15 +281,12 @@ TEST(test_socketcan_netlink_failure_leaves_the_interface_active) {
     wait_ms(1);
     (void)state();
     fake_interface.netlink_fails = true;
-    wait_ms(200);
-    TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state());
+    assert_state_after_ms(200, IW_BUS_ACTIVE);
     TEST_ASSERT_FALSE(link_now()->echo_proven);
 }
 
 TEST(test_socketcan_down_interface_is_read_once_per_period) {
-    fake_interface.ours.error = ENETDOWN;
-    fake_interface.presence = IWL_LINK_DOWN;
-    wait_ms(1);
+    set_down();
     poll();
     TEST_ASSERT_EQUAL_UINT64(now_us + 200000U, iwl_bus_next_us(&store));
     const unsigned before = fake_interface.readings;
@@ -302,9 +298,7 @@ TEST(test_socketcan_down_interface_is_read_once_per_period) {
 }
 
 TEST(test_socketcan_interface_that_stays_down_is_no_change) {
-    fake_interface.ours.error = ENETDOWN;
-    fake_interface.presence = IWL_LINK_DOWN;
-    wait_ms(1);
+    set_down();
     wait_ms(200);
     const uint32_t changes = link_now()->changes;
     wait_ms(200);
@@ -358,13 +352,11 @@ TEST(test_socketcan_interface_without_sockets_is_down) {
     iwl_bus_close(&store);
     fake_interface.sockets_fail = true;
     TEST_ASSERT_EQUAL_INT(0, iwl_bus_open(&store, "can0"));
-    wait_ms(1);
-    TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, state());
+    assert_state_after_ms(1, IW_BUS_DOWN);
     TEST_ASSERT_EQUAL_INT(-1, receive(&frame));
     TEST_ASSERT_EQUAL_INT(-1, send_setpoint());
     fake_interface.sockets_fail = false;
-    wait_ms(200);
-    TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state());
+    assert_state_after_ms(200, IW_BUS_ACTIVE);
 }
 
 TEST(test_socketcan_full_queue_is_no_loss) {
@@ -469,21 +461,16 @@ TEST(test_socketcan_other_ids_come_after_ours_and_setpoints) {
     TEST_ASSERT_EQUAL_HEX32(0x700, frame.id);
     TEST_ASSERT_EQUAL_INT(0, receive(&frame));
     fake_interface_put(&fake_interface.others, 0x701, 4, 0);
-    wait_ms(1);
-    TEST_ASSERT_EQUAL_INT(0, receive(&frame));
+    assert_received_after_ms(1, 0);
     TEST_ASSERT_EQUAL_INT(1, send_setpoint());
-    wait_ms(2);
-    TEST_ASSERT_EQUAL_INT(0, receive(&frame));
+    assert_received_after_ms(2, 0);
     wait_ms(1);
     TEST_ASSERT_EQUAL_INT(1, receive(&frame));
     TEST_ASSERT_EQUAL_HEX32(0x701, frame.id);
-    wait_ms(20);
-    TEST_ASSERT_EQUAL_INT(0, receive(&frame));
+    assert_received_after_ms(20, 0);
     fake_interface_put(&fake_interface.others, 0x702, 4, 0);
-    wait_ms(9);
-    TEST_ASSERT_EQUAL_INT(0, receive(&frame));
-    wait_ms(1);
-    TEST_ASSERT_EQUAL_INT(1, receive(&frame));
+    assert_received_after_ms(9, 0);
+    assert_received_after_ms(1, 1);
 }
 
 TEST(test_socketcan_echo_has_the_mark_of_the_message) {
@@ -518,13 +505,10 @@ TEST(test_socketcan_events_are_read_only_after_a_wake_by_the_bus) {
 }
 
 TEST(test_socketcan_interface_up_is_found_without_a_wake) {
-    fake_interface.ours.error = ENETDOWN;
-    fake_interface.presence = IWL_LINK_DOWN;
-    wait_ms(1);
+    set_down();
     fake_interface.presence = IWL_LINK_UP;
     fake_interface.news = true;
     iwl_bus_waited(&store, false);
-    wait_ms(1);
-    TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, state()); // The loss is reported once.
+    assert_state_after_ms(1, IW_BUS_DOWN); // The loss is reported once.
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state());
 }

@@ -35,6 +35,13 @@ static void calm(void) {
     rig.view.output_zero = true;
 }
 
+/// After a stop, with the wheels at standstill for this time.
+static void hold_for(iw_time_us_t for_us) {
+    permit_rig_begin(&rig, PERMIT_HOLDING);
+    calm();
+    permit_rig_wait(&rig, for_us);
+}
+
 static void release(void) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, iw_permit_release(&rig.permit));
     permit_rig_step(&rig);
@@ -126,9 +133,7 @@ TEST(test_permit_keep_release_while_driving_or_arming_is_refused) {
         permit_rig_raise(&rig, IW_CAUSE_ESTOP_LINE);
         assert_held_for_a_day(IW_STATE_LATCHED);
     }
-    permit_rig_begin(&rig, PERMIT_HOLDING);
-    calm();
-    permit_rig_wait(&rig, MS(600));
+    hold_for(MS(600));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_AT_REST, iw_permit_release(&rig.permit));
 }
@@ -158,9 +163,7 @@ TEST(test_permit_keep_release_without_setpoints_changes_nothing) {
 }
 
 TEST(test_permit_keep_latch_while_listening_sends_nothing) {
-    permit_rig_begin(&rig, PERMIT_HOLDING);
-    calm();
-    permit_rig_wait(&rig, MS(2000));
+    hold_for(MS(2000));
     release();
     permit_rig_raise(&rig, IW_CAUSE_ESTOP_LINE);
     permit_rig_step(&rig);
@@ -206,9 +209,7 @@ TEST(test_permit_keep_latch_is_not_held_unless_configured) {
 }
 
 TEST(test_permit_keep_is_not_ended_by_any_other_request) {
-    permit_rig_begin(&rig, PERMIT_HOLDING);
-    calm();
-    permit_rig_wait(&rig, MS(5000));
+    hold_for(MS(5000));
     iw_permit_stop(&rig.permit, rig.now_us, OTHER, IW_CAUSE_CLIENT_STOP);
     iw_permit_disconnect(&rig.permit, rig.now_us, HOLDER);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_reset(&rig));
@@ -218,9 +219,7 @@ TEST(test_permit_keep_is_not_ended_by_any_other_request) {
 }
 
 TEST(test_permit_keep_ends_by_arm_and_returns_if_arming_fails) {
-    permit_rig_begin(&rig, PERMIT_HOLDING);
-    calm();
-    permit_rig_wait(&rig, MS(5000));
+    hold_for(MS(5000));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
     TEST_ASSERT_FALSE(iw_permit_holding(&rig.permit));
     permit_rig_wait(&rig, MS(50));
@@ -241,9 +240,7 @@ TEST(test_permit_keep_ends_with_the_gateway) {
     permit_rig_raise(&rig, IW_CAUSE_ESTOP_LINE);
     permit_rig_wait(&rig, MS(1500));
     assert_silent(IW_STATE_LATCHED);
-    permit_rig_begin(&rig, PERMIT_HOLDING);
-    calm();
-    permit_rig_wait(&rig, MS(5000));
+    hold_for(MS(5000));
     iw_permit_stop(&rig.permit, rig.now_us, IW_CLIENT_NONE, IW_CAUSE_SHUTDOWN);
     permit_rig_step(&rig);
     assert_silent(IW_STATE_LISTENING);
@@ -263,9 +260,7 @@ TEST(test_permit_keep_returns_with_arm_after_a_shutdown) {
 }
 
 TEST(test_permit_keep_ends_by_a_second_master) {
-    permit_rig_begin(&rig, PERMIT_HOLDING);
-    calm();
-    permit_rig_wait(&rig, MS(5000));
+    hold_for(MS(5000));
     permit_rig_raise(&rig, IW_CAUSE_SECOND_MASTER);
     TEST_ASSERT_FALSE(iw_permit_holding(&rig.permit));
     permit_rig_wait(&rig, MS(1500) - 1U);

@@ -4,8 +4,6 @@
 
 #include "unit.h"
 
-#include <string.h>
-
 void setUp(void) {
     rig_init();
 }

@@ -22,6 +22,11 @@ static unsigned status(void) {
     return verdict.status;
 }
 
+static void assert_status_of(const char *path, unsigned expected) {
+    asked.path = path;
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(expected, status(), path);
+}
+
 TEST(test_request_with_token_to_an_address_is_accepted) {
     TEST_ASSERT_EQUAL_UINT(200, status());
     TEST_ASSERT_EQUAL(WEB_STATUS, web_judge(&rules, &asked).route->verb);
@@ -77,8 +82,7 @@ TEST(test_request_cross_site_is_refused_except_the_page_itself) {
     asked.site = "same-origin";
     TEST_ASSERT_EQUAL_UINT(200, status());
     asked.site = "cross-site";
-    asked.path = "/";
-    TEST_ASSERT_EQUAL_UINT(200, status());
+    assert_status_of("/", 200);
     asked.origin = "http://evil.example";
     TEST_ASSERT_EQUAL_UINT(403, status());
 }
@@ -88,19 +92,14 @@ TEST(test_request_without_proof_is_refused) {
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
         asked.proof = wrong[i];
         asked.method = "GET";
-        asked.path = "/api/status";
-        TEST_ASSERT_EQUAL_UINT(401, status());
+        assert_status_of("/api/status", 401);
         TEST_ASSERT_EQUAL_STRING((wrong[i] == WEB_PROOF_OVER) ? "bad_session" : "bad_token",
                                  web_judge(&rules, &asked).error);
-        asked.path = "/nowhere";
-        TEST_ASSERT_EQUAL_UINT(401, status());
-        asked.path = "/page.js";
-        TEST_ASSERT_EQUAL_UINT(200, status());
-        asked.path = "/api/challenge";
-        TEST_ASSERT_EQUAL_UINT(200, status());
+        assert_status_of("/nowhere", 401);
+        assert_status_of("/page.js", 200);
+        assert_status_of("/api/challenge", 200);
         asked.method = "POST";
-        asked.path = "/api/estop";
-        TEST_ASSERT_EQUAL_UINT(401, status());
+        assert_status_of("/api/estop", 401);
     }
 }
 
@@ -112,8 +111,7 @@ TEST(test_secret_for_reading_grants_only_reading) {
     TEST_ASSERT_EQUAL_UINT(200, status());
     asked.method = "POST";
     for (size_t i = 0; i < sizeof commands / sizeof commands[0]; i++) {
-        asked.path = commands[i];
-        TEST_ASSERT_EQUAL_UINT_MESSAGE(401, status(), commands[i]);
+        assert_status_of(commands[i], 401);
     }
 }
 
@@ -142,11 +140,9 @@ TEST(test_request_to_unknown_path_or_method_is_refused) {
     static const char *const nowhere[] = {"/api", "/api/status/", "/../etc/passwd",   "/%2e%2e/token", "//",
                                           "",     "/index.html",  "/uPlot.LICENSE/.."};
     for (size_t i = 0; i < sizeof nowhere / sizeof nowhere[0]; i++) {
-        asked.path = nowhere[i];
-        TEST_ASSERT_EQUAL_UINT_MESSAGE(404, status(), nowhere[i]);
+        assert_status_of(nowhere[i], 404);
     }
-    asked.path = "/api/stop";
-    TEST_ASSERT_EQUAL_UINT(405, status());
+    assert_status_of("/api/stop", 405);
     asked.method = "POST";
     TEST_ASSERT_EQUAL_UINT(200, status());
 }
@@ -158,8 +154,7 @@ TEST(test_request_with_a_body_is_refused) {
     TEST_ASSERT_EQUAL_UINT(413, status());
     asked.method = "POST";
     TEST_ASSERT_EQUAL_UINT(413, status());
-    asked.path = "/api/stop";
-    TEST_ASSERT_EQUAL_UINT(413, status());
+    assert_status_of("/api/stop", 413);
     asked.body = 4097;
     TEST_ASSERT_EQUAL_UINT(413, status());
 }
@@ -172,30 +167,24 @@ TEST(test_stop_is_never_refused_for_a_short_body) {
     asked.path = "/api/estop";
     asked.body = 4096;
     TEST_ASSERT_EQUAL_UINT(200, status());
-    asked.path = "/api/record";
-    TEST_ASSERT_EQUAL_UINT(413, status());
+    assert_status_of("/api/record", 413);
 }
 
 TEST(test_driving_and_reset_are_refused_unless_configured) {
     asked.method = "POST";
-    asked.path = "/api/arm";
-    TEST_ASSERT_EQUAL_UINT(403, status());
-    asked.path = "/api/drive";
-    TEST_ASSERT_EQUAL_UINT(403, status());
+    assert_status_of("/api/arm", 403);
+    assert_status_of("/api/drive", 403);
     rules.may_drive = true;
     TEST_ASSERT_EQUAL_UINT(200, status());
-    asked.path = "/api/reset";
-    TEST_ASSERT_EQUAL_UINT(403, status());
+    assert_status_of("/api/reset", 403);
     rules.may_reset = true;
     TEST_ASSERT_EQUAL_UINT(200, status());
 }
 
 TEST(test_stop_and_estop_are_always_accepted) {
     asked.method = "POST";
-    asked.path = "/api/stop";
-    TEST_ASSERT_EQUAL_UINT(200, status());
-    asked.path = "/api/estop";
-    TEST_ASSERT_EQUAL_UINT(200, status());
+    assert_status_of("/api/stop", 200);
+    assert_status_of("/api/estop", 200);
 }
 
 TEST(test_number_with_other_characters_or_out_of_range_is_refused) {
