@@ -18,7 +18,11 @@ void tearDown(void) {
     daemon_rig_end();
 }
 
-void assert_reply(const char *line, const char *part) {
-    const char *reply = daemon_rig_ask(client, line);
+void assert_reply_to(int who, const char *line, const char *part) {
+    const char *reply = daemon_rig_ask(who, line);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, part), (reply[0] != '\0') ? reply : line);
+}
+
+void assert_reply(const char *line, const char *part) {
+    assert_reply_to(client, line, part);
 }

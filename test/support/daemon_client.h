@@ -11,4 +11,7 @@ extern int client;
 /// Asserts that the reply to the client's request contains this text.
 void assert_reply(const char *line, const char *part);
 
+/// The same for another connection.
+void assert_reply_to(int who, const char *line, const char *part);
+
 #endif

@@ -354,19 +354,43 @@ void daemon_rig_run(unsigned for_ms) {
     daemon_rig.ended = gw_loop_run(daemon_rig.daemon) == 0;
 }
 
-int daemon_rig_connect_with(sock_right_t right) {
+int daemon_rig_knock(sock_right_t right) {
     struct sockaddr_un address = {.sun_family = AF_UNIX};
     socklen_t length = sizeof address;
     const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0);
     TEST_ASSERT_EQUAL_INT(
         0, getsockname(daemon_rig.daemon->clients.listener[right].fd, (struct sockaddr *)&address, &length));
     TEST_ASSERT_EQUAL_INT(0, connect(fd, (const struct sockaddr *)&address, length));
+    return fd;
+}
+
+int daemon_rig_connect_with(sock_right_t right) {
+    const int fd = daemon_rig_knock(right);
     daemon_rig_run(2);
     return fd;
 }
 
 int daemon_rig_connect(void) {
     return daemon_rig_connect_with(SOCK_DRIVE);
+}
+
+void daemon_rig_send(int client, const char *lines) {
+    TEST_ASSERT_EQUAL_INT((int)strlen(lines), (int)send(client, lines, strlen(lines), MSG_NOSIGNAL));
+}
+
+const char *daemon_rig_receive(int client) {
+    static char text[1U << 20];
+    const ssize_t length = recv(client, text, sizeof text - 1U, MSG_DONTWAIT);
+    text[(length > 0) ? length : 0] = '\0';
+    return text;
+}
+
+unsigned daemon_rig_count(const char *text, const char *words) {
+    unsigned count = 0;
+    for (const char *at = strstr(text, words); at != NULL; at = strstr(at + 1, words)) {
+        count++;
+    }
+    return count;
 }
 
 /// Asserts that a line of the gateway is correct JSON.
@@ -396,8 +420,8 @@ const char *daemon_rig_ask(int client, const char *line) {
     char *reply = daemon_rig.reply;
     while (take_line(client, reply, sizeof daemon_rig.reply)) { // Earlier replies.
     }
-    TEST_ASSERT_EQUAL_INT((int)strlen(line), (int)send(client, line, strlen(line), MSG_NOSIGNAL));
-    TEST_ASSERT_EQUAL_INT(1, (int)send(client, "\n", 1, MSG_NOSIGNAL));
+    daemon_rig_send(client, line);
+    daemon_rig_send(client, "\n");
     for (unsigned ms = 0; ms < REPLY_MS; ms++) {
         daemon_rig_run(1);
         while (take_line(client, reply, sizeof daemon_rig.reply)) {
@@ -448,11 +472,7 @@ const char *daemon_rig_log(void) {
 }
 
 unsigned daemon_rig_logged(const char *words) {
-    unsigned count = 0;
-    for (const char *at = strstr(daemon_rig_log(), words); at != NULL; at = strstr(at + 1, words)) {
-        count++;
-    }
-    return count;
+    return daemon_rig_count(daemon_rig_log(), words);
 }
 
 bool daemon_rig_marked(void) {

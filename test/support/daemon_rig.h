@@ -80,6 +80,18 @@ void daemon_rig_run(unsigned for_ms);
 int daemon_rig_connect(void);
 int daemon_rig_connect_with(sock_right_t right);
 
+/// Opens a new connection with this right while nothing of the gateway runs.
+int daemon_rig_knock(sock_right_t right);
+
+/// Sends lines that the gateway has not read yet.
+void daemon_rig_send(int client, const char *lines);
+
+/// Returns all bytes that the client has received, terminated; "" if there are none. The next call overwrites them.
+const char *daemon_rig_receive(int client);
+
+/// Returns how often these words are in the text.
+unsigned daemon_rig_count(const char *text, const char *words);
+
 /// Sends a line and runs the loop until its reply has come, for at most 20 ms. Skips events. Returns "" without a reply.
 const char *daemon_rig_ask(int client, const char *line);
 

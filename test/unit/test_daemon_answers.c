@@ -7,7 +7,6 @@
 #include "iwheel_server/target.h"
 #include <stdlib.h>
 #include <string.h>
-#include <sys/socket.h>
 
 static uint64_t noted_so_far(void) {
     return blackbox_ring_written(daemon_rig.daemon->box.ring);
@@ -220,21 +219,12 @@ TEST(test_status_has_the_offset_samples_of_each_wheel) {
 }
 
 TEST(test_arm_is_answered_once) {
-    char text[8192];
-    unsigned answers = 0;
     daemon_rig_run(10);
-    while (recv(client, text, sizeof text, MSG_DONTWAIT) > 0) { // Bytes of before
-    }
-    static const char line[] = "{\"cmd\":\"arm\"}\n";
-    TEST_ASSERT_EQUAL_INT((int)sizeof line - 1, (int)send(client, line, sizeof line - 1U, MSG_NOSIGNAL));
+    (void)daemon_rig_receive(client); // Bytes of before
+    daemon_rig_send(client, "{\"cmd\":\"arm\"}\n");
     daemon_rig_run(20);
-    const ssize_t size = recv(client, text, sizeof text - 1U, MSG_DONTWAIT);
-    TEST_ASSERT_GREATER_THAN_INT(0, (int)size);
-    text[size] = '\0';
-    for (const char *at = strstr(text, "\"ok\":"); at != NULL; at = strstr(at + 1, "\"ok\":")) {
-        answers++;
-    }
-    TEST_ASSERT_EQUAL_UINT_MESSAGE(1U, answers, text);
+    const char *text = daemon_rig_receive(client);
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(1U, daemon_rig_count(text, "\"ok\":"), text);
 }
 
 TEST(test_twist_with_contradicted_track_is_denied_with_the_reason) {
@@ -297,8 +287,7 @@ static void expect_contacts(int first, int second, const char *status, const cha
     daemon_rig.estop = first;
     daemon_rig.estop2 = second;
     daemon_rig_run(20);
-    const char *reply = daemon_rig_ask(client, "{\"cmd\":\"status\"}");
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, status), reply);
+    assert_reply("{\"cmd\":\"status\"}", status);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(daemon_rig_log(), expected), daemon_rig_log());
 }
 

@@ -104,7 +104,7 @@ TEST(test_killed_while_armed_next_start_sends_zeros) {
 
 TEST(test_killed_in_the_ramp_next_start_sends_zeros) {
     daemon_rig_begin_driving(client);
-    TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"stop\"}"), "\"ok\":true"));
+    assert_reply("{\"cmd\":\"stop\"}", "\"ok\":true");
     daemon_rig_run(60);
     TEST_ASSERT_FALSE(daemon_rig_commands_zero());
     assert_next_start_sends_zeros();
@@ -112,7 +112,7 @@ TEST(test_killed_in_the_ramp_next_start_sends_zeros) {
 
 TEST(test_killed_in_the_hold_next_start_sends_zeros) {
     daemon_rig_begin_driving(client);
-    TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"stop\"}"), "\"ok\":true"));
+    assert_reply("{\"cmd\":\"stop\"}", "\"ok\":true");
     daemon_rig_run(1000);
     TEST_ASSERT_TRUE(daemon_rig_commands_zero());
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, daemon_rig_state());
@@ -129,7 +129,7 @@ TEST(test_killed_in_zeros_of_restart_next_start_sends_zeros) {
 
 TEST(test_killed_while_listening_next_start_sends_nothing) {
     daemon_rig_begin_driving(client);
-    TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"stop\"}"), "\"ok\":true"));
+    assert_reply("{\"cmd\":\"stop\"}", "\"ok\":true");
     daemon_rig_run(4000);
     const uint32_t before = daemon_rig.sent[IW_RIGHT];
     daemon_rig_crash();
@@ -196,13 +196,13 @@ TEST(test_software_estop_stays_latched_after_its_client_ends) {
     for (size_t i = 0; i < sizeof hold_ms / sizeof hold_ms[0]; i++) {
         const int other = daemon_rig_connect();
         daemon_rig_begin_driving(client);
-        TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(other, "{\"cmd\":\"estop\",\"reason\":\"test\"}"), "\"ok\":true"));
+        assert_reply_to(other, "{\"cmd\":\"estop\",\"reason\":\"test\"}", "\"ok\":true");
         daemon_rig_run(hold_ms[i]);
         (void)close(other);
         daemon_rig_run(3000);
         TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
-        TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"arm\"}"), "\"error\":\"latched\""));
-        TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"reset\"}"), "\"ok\":true"));
+        assert_reply("{\"cmd\":\"arm\"}", "\"error\":\"latched\"");
+        assert_reply("{\"cmd\":\"reset\"}", "\"ok\":true");
     }
 }
 
@@ -316,9 +316,8 @@ TEST(test_lease_ends_immediately_with_the_connection) {
 }
 
 TEST(test_lease_end_by_hangup_precedes_the_last_request) {
-    static const char line[] = "{\"cmd\":\"stop\"}\n";
     daemon_rig_begin_driving(client);
-    TEST_ASSERT_EQUAL_INT((int)sizeof line - 1, (int)send(client, line, sizeof line - 1U, MSG_NOSIGNAL));
+    daemon_rig_send(client, "{\"cmd\":\"stop\"}\n");
     (void)close(client);
     daemon_rig_run(1);
     client = daemon_rig_connect();
@@ -393,7 +392,7 @@ static void end_by(int number) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, daemon_rig_state());
     TEST_ASSERT_FALSE(daemon_rig_commands_zero());
     const iw_time_us_t commanded_us = daemon_rig.now_us;
-    TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"arm\"}"), "shutting down"));
+    assert_reply("{\"cmd\":\"arm\"}", "shutting down");
     daemon_rig_run(10000);
     TEST_ASSERT_TRUE(daemon_rig.ended);
     TEST_ASSERT_TRUE(daemon_rig_commands_zero());

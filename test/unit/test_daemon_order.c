@@ -26,30 +26,18 @@ static void crowd_goes(void) {
     }
 }
 
-static void put_line(int fd, const char *line) {
-    TEST_ASSERT_EQUAL_INT(strlen(line), write(fd, line, strlen(line)));
-}
-
-/// Everything that the client has received so far.
-static const char *received(int fd) {
-    static char text[8192];
-    const ssize_t length = read(fd, text, sizeof text - 1U);
-    text[(length > 0) ? length : 0] = '\0';
-    return text;
-}
-
 static void test_two_takeovers_in_one_wake_up_grant_one_lease(void) {
     unsigned granted = 0;
     unsigned refused = 0;
     daemon_rig_arm(client);
     crowd_comes();
     for (unsigned i = 0; i < CROWD; i++) {
-        (void)received(crowd[i]);
-        put_line(crowd[i], "{\"cmd\":\"arm\",\"takeover\":true,\"id\":7}\n");
+        (void)daemon_rig_receive(crowd[i]);
+        daemon_rig_send(crowd[i], "{\"cmd\":\"arm\",\"takeover\":true,\"id\":7}\n");
     }
     daemon_rig_run(60);
     for (unsigned i = 0; i < CROWD; i++) {
-        const char *text = received(crowd[i]);
+        const char *text = daemon_rig_receive(crowd[i]);
         granted += (strstr(text, "\"ok\":true") != NULL) ? 1U : 0U;
         refused += (strstr(text, "\"ok\":false") != NULL) ? 1U : 0U;
     }
@@ -62,9 +50,9 @@ static void test_two_takeovers_in_one_wake_up_grant_one_lease(void) {
 static void test_stop_and_command_in_one_wake_up_stop(void) {
     crowd_comes();
     daemon_rig_begin_driving(client);
-    put_line(client, "{\"cmd\":\"drive\",\"left_mm_s\":500,\"right_mm_s\":500}\n");
-    put_line(crowd[0], "{\"cmd\":\"stop\"}\n");
-    put_line(client, "{\"cmd\":\"drive\",\"left_mm_s\":500,\"right_mm_s\":500}\n");
+    daemon_rig_send(client, "{\"cmd\":\"drive\",\"left_mm_s\":500,\"right_mm_s\":500}\n");
+    daemon_rig_send(crowd[0], "{\"cmd\":\"stop\"}\n");
+    daemon_rig_send(client, "{\"cmd\":\"drive\",\"left_mm_s\":500,\"right_mm_s\":500}\n");
     daemon_rig_run(20);
     TEST_ASSERT_NOT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
     daemon_rig_run(3000);
@@ -74,9 +62,9 @@ static void test_stop_and_command_in_one_wake_up_stop(void) {
 
 static void test_estop_and_reset_in_one_wake_up_stay_latched(void) {
     crowd_comes();
-    put_line(crowd[0], "{\"cmd\":\"reset\"}\n");
-    put_line(crowd[1], "{\"cmd\":\"estop\"}\n");
-    put_line(crowd[2], "{\"cmd\":\"reset\"}\n");
+    daemon_rig_send(crowd[0], "{\"cmd\":\"reset\"}\n");
+    daemon_rig_send(crowd[1], "{\"cmd\":\"estop\"}\n");
+    daemon_rig_send(crowd[2], "{\"cmd\":\"reset\"}\n");
     daemon_rig_run(20);
     TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
     crowd_goes();

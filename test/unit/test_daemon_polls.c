@@ -5,13 +5,7 @@
 #include "unit.h"
 
 #include <string.h>
-#include <sys/socket.h>
 #include <unistd.h>
-
-/// Sends a line that the daemon has not read yet.
-static void send_line(const char *line) {
-    TEST_ASSERT_EQUAL_INT((int)strlen(line), (int)send(client, line, strlen(line), MSG_NOSIGNAL));
-}
 
 /// Starts driving and stops between two pairs, so that only the next request is due.
 static void begin_driving_between_pairs(void) {
@@ -29,7 +23,7 @@ TEST(test_estop_pressed_before_wake_latches_before_next_setpoint) {
         daemon_rig_begin_driving(client);
         daemon_rig_run(phase);
         daemon_rig.most_mm_s = 0;
-        send_line(SLOWER);
+        daemon_rig_send(client, SLOWER);
         daemon_rig.estop_silent = phase % 2U == 1U;
         daemon_rig.estop = (phase % 4U < 2U) ? 1 : -1;
         daemon_rig_run(1);
@@ -44,7 +38,7 @@ TEST(test_estop_pressed_before_wake_latches_before_next_setpoint) {
 TEST(test_estop_pulse_after_wake_latches_before_next_setpoint) {
     begin_driving_between_pairs();
     daemon_rig.estop_late = true;
-    send_line(SLOWER);
+    daemon_rig_send(client, SLOWER);
     daemon_rig_run(1);
     TEST_ASSERT_FALSE(daemon_rig.estop_late);
     TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
@@ -56,7 +50,7 @@ TEST(test_command_of_the_holder_is_sent_after_one_poll) {
     begin_driving_between_pairs();
     const uint32_t polls = daemon_rig.polls;
     const uint32_t sent = daemon_rig.sent[IW_LEFT];
-    send_line(SLOWER);
+    daemon_rig_send(client, SLOWER);
     daemon_rig_run(1);
     TEST_ASSERT_EQUAL_UINT32(polls + 1U, daemon_rig.polls);
     TEST_ASSERT_EQUAL_UINT32(sent + 1U, daemon_rig.sent[IW_LEFT]);
@@ -68,7 +62,7 @@ TEST(test_wait_reads_the_clock_only_while_setpoints_are_sent) {
     TEST_ASSERT_TRUE(daemon_rig.wait_from_us > 0U);
     daemon_rig_begin_driving(client);
     TEST_ASSERT_EQUAL_UINT64(0, daemon_rig.wait_from_us);
-    TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"stop\"}"), "\"ok\":true"));
+    assert_reply("{\"cmd\":\"stop\"}", "\"ok\":true");
     daemon_rig_run(1000);
     TEST_ASSERT_EQUAL_UINT64(0, daemon_rig.wait_from_us);
     daemon_rig_run(5000);
@@ -87,23 +81,22 @@ TEST(test_poll_is_not_just_before_a_setpoint_and_within_3_ms) {
 
 /// Checks that the command is refused because it was sent before the stop.
 static void assert_refused_behind_a_stop(void) {
-    char reply[4096] = "";
     TEST_ASSERT_TRUE(daemon_rig_commands_zero());
     TEST_ASSERT_EQUAL_INT(0, daemon_rig.most_mm_s);
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, daemon_rig_state());
-    (void)recv(client, reply, sizeof reply - 1U, MSG_DONTWAIT);
+    const char *reply = daemon_rig_receive(client);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, "\"ok\":false"), reply);
 }
 
 TEST(test_command_that_waited_during_a_stall_is_refused) {
     begin_driving_between_pairs();
-    send_line(SLOWER);
+    daemon_rig_send(client, SLOWER);
     daemon_rig.stolen_us = 150000U;
     daemon_rig_run(1);
     assert_refused_behind_a_stop();
     daemon_rig_run(4000);
     begin_driving_between_pairs();
-    send_line(SLOWER);
+    daemon_rig_send(client, SLOWER);
     daemon_rig.suspended_us += 150000U;
     daemon_rig_run(1);
     assert_refused_behind_a_stop();
@@ -112,8 +105,7 @@ TEST(test_command_that_waited_during_a_stall_is_refused) {
 TEST(test_command_together_with_the_estop_is_refused) {
     daemon_rig_begin_driving(client);
     daemon_rig.estop = 1;
-    const char *reply = daemon_rig_ask(client, "{\"cmd\":\"drive\",\"left_mm_s\":500,\"right_mm_s\":500}");
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, "\"ok\":false"), reply);
+    assert_reply("{\"cmd\":\"drive\",\"left_mm_s\":500,\"right_mm_s\":500}", "\"ok\":false");
     TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
 }
 

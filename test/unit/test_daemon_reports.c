@@ -11,7 +11,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/socket.h>
 #include <unistd.h>
 
 TEST(test_bus_that_cannot_be_opened_is_named) {
@@ -49,14 +48,11 @@ TEST(test_status_has_at_most_the_maximum_of_warnings) {
 }
 
 TEST(test_hello_has_the_time_of_its_cycle) {
-    char text[1024];
     daemon_rig_run(7);
     const iw_time_us_t before_us = daemon_rig.now_us;
     const int other = daemon_rig_connect();
     daemon_rig_run(5);
-    const ssize_t size = recv(other, text, sizeof text - 1U, MSG_DONTWAIT);
-    TEST_ASSERT_GREATER_THAN_INT(0, (int)size);
-    text[size] = '\0';
+    const char *text = daemon_rig_receive(other);
     const char *found = strstr(text, "\"t_us\":");
     TEST_ASSERT_NOT_NULL_MESSAGE(found, text);
     TEST_ASSERT_GREATER_OR_EQUAL_UINT64(before_us, strtoull(found + strlen("\"t_us\":"), NULL, 10));
@@ -90,12 +86,9 @@ TEST(test_log_of_estop_is_warning_if_pressed_info_if_released) {
 
 /// Sends a line, waits for 30 ms, and returns all received bytes.
 static const char *said_after(const char *line) {
-    static char text[1U << 16];
-    TEST_ASSERT_EQUAL_INT((int)strlen(line), (int)send(client, line, strlen(line), MSG_NOSIGNAL));
+    daemon_rig_send(client, line);
     daemon_rig_run(30);
-    const ssize_t size = recv(client, text, sizeof text - 1U, MSG_DONTWAIT);
-    text[(size > 0) ? size : 0] = '\0';
-    return text;
+    return daemon_rig_receive(client);
 }
 
 /// Checks that an event with this name has arrived and contains `part`.
@@ -153,13 +146,11 @@ TEST(test_stop_is_reported_with_its_request) {
 }
 
 TEST(test_arm_ended_by_estop_is_refused_with_id_and_reason) {
-    static const char estop[] = "{\"cmd\":\"estop\",\"reason\":\"smoke\"}\n";
     const int other = daemon_rig_connect();
     daemon_rig_run(20);
     daemon_rig_keep_log();
-    static const char arm[] = "{\"id\":41,\"cmd\":\"arm\"}\n";
-    TEST_ASSERT_EQUAL_INT((int)sizeof arm - 1, (int)send(client, arm, sizeof arm - 1U, MSG_NOSIGNAL));
-    TEST_ASSERT_EQUAL_INT((int)sizeof estop - 1, (int)send(other, estop, sizeof estop - 1U, MSG_NOSIGNAL));
+    daemon_rig_send(client, "{\"id\":41,\"cmd\":\"arm\"}\n");
+    daemon_rig_send(other, "{\"cmd\":\"estop\",\"reason\":\"smoke\"}\n");
     const char *text_sent = said_after("");
     TEST_ASSERT_NOT_NULL_MESSAGE(
         strstr(text_sent, "\"id\":41,\"ok\":false,\"error\":\"cause_present\",\"message\":\"estop_software"),

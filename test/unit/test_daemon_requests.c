@@ -113,8 +113,7 @@ TEST(test_tare_of_both_refused_for_one_changes_neither) {
 }
 
 TEST(test_client_that_ends_during_arm_leaves_no_lease) {
-    static const char line[] = "{\"cmd\":\"arm\"}\n";
-    TEST_ASSERT_EQUAL_INT((int)sizeof line - 1, (int)send(client, line, sizeof line - 1U, MSG_NOSIGNAL));
+    daemon_rig_send(client, "{\"cmd\":\"arm\"}\n");
     (void)close(client);
     daemon_rig_run(50);
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, daemon_rig_state());
@@ -123,9 +122,7 @@ TEST(test_client_that_ends_during_arm_leaves_no_lease) {
 }
 
 TEST(test_command_sent_together_with_arm_is_stale) {
-    static const char lines[] =
-        "{\"cmd\":\"arm\"}\n{\"id\":9,\"cmd\":\"drive\",\"left_mm_s\":300,\"right_mm_s\":300}\n";
-    TEST_ASSERT_EQUAL_INT((int)sizeof lines - 1, (int)send(client, lines, sizeof lines - 1U, MSG_NOSIGNAL));
+    daemon_rig_send(client, "{\"cmd\":\"arm\"}\n{\"id\":9,\"cmd\":\"drive\",\"left_mm_s\":300,\"right_mm_s\":300}\n");
     for (unsigned ms = 0; ms < 500U; ms++) {
         daemon_rig_run(1);
         TEST_ASSERT_EQUAL_INT(0, daemon_rig.commanded_mm_s[IW_LEFT]);
@@ -133,20 +130,13 @@ TEST(test_command_sent_together_with_arm_is_stale) {
     }
 }
 
-static void send_together(int who, const char *lines) {
-    TEST_ASSERT_EQUAL_INT((int)strlen(lines), (int)send(who, lines, strlen(lines), MSG_NOSIGNAL));
-}
-
 /// The arm is granted, but another client stops before the wheels answer.
 TEST(test_arm_followed_by_estop_of_another_client_is_refused) {
-    char text[4096];
     const int other = daemon_rig_connect();
-    send_together(client, "{\"id\":7,\"cmd\":\"arm\"}\n");
-    send_together(other, "{\"cmd\":\"estop\"}\n");
+    daemon_rig_send(client, "{\"id\":7,\"cmd\":\"arm\"}\n");
+    daemon_rig_send(other, "{\"cmd\":\"estop\"}\n");
     daemon_rig_run(100);
-    const ssize_t length = recv(client, text, sizeof text - 1U, MSG_DONTWAIT);
-    TEST_ASSERT_GREATER_THAN_INT(0, (int)length);
-    text[length] = '\0';
+    const char *text = daemon_rig_receive(client);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "{\"id\":7,\"ok\":false,"), text);
     TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
     (void)close(other);
@@ -159,8 +149,8 @@ TEST(test_reset_and_arm_that_waited_do_not_undo_a_stop) {
     const int other = daemon_rig_connect();
     daemon_rig_run(20);
     for (size_t i = 0; i < sizeof stops / sizeof stops[0]; i++) {
-        send_together(client, "{\"cmd\":\"arm\"}\n{\"cmd\":\"reset\"}\n{\"id\":9,\"cmd\":\"arm\"}\n");
-        send_together(other, stops[i]);
+        daemon_rig_send(client, "{\"cmd\":\"arm\"}\n{\"cmd\":\"reset\"}\n{\"id\":9,\"cmd\":\"arm\"}\n");
+        daemon_rig_send(other, stops[i]);
         daemon_rig_run(100);
         TEST_ASSERT_EQUAL_INT(after[i], daemon_rig_state());
         daemon_rig_run(2000); // Zeros are held for this time.
@@ -172,7 +162,7 @@ TEST(test_reset_and_arm_that_waited_do_not_undo_a_stop) {
 
 TEST(test_stop_and_arm_of_one_client_are_both_executed) {
     daemon_rig_run(20);
-    send_together(client, "{\"cmd\":\"stop\"}\n{\"cmd\":\"arm\"}\n");
+    daemon_rig_send(client, "{\"cmd\":\"stop\"}\n{\"cmd\":\"arm\"}\n");
     daemon_rig_run(50);
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
 }
@@ -181,7 +171,7 @@ TEST(test_command_that_waited_during_a_stall_renews_from_its_time) {
     static const char line[] = "{\"cmd\":\"drive\",\"left_mm_s\":300,\"right_mm_s\":300}\n";
     daemon_rig_arm(client);
     daemon_rig_drive(client, 300, 300, 500);
-    TEST_ASSERT_EQUAL_INT((int)sizeof line - 1, (int)send(client, line, sizeof line - 1U, MSG_NOSIGNAL));
+    daemon_rig_send(client, line);
     daemon_rig.stolen_us = 90000U; // Late, but not late enough for a stop
     const iw_time_us_t sent_us = daemon_rig.now_us;
     daemon_rig_run(1);
@@ -195,11 +185,11 @@ TEST(test_takeover_is_refused_in_motion_granted_at_standstill) {
     const int other = daemon_rig_connect();
     daemon_rig_arm(client);
     daemon_rig_drive(client, 200, 200, 500);
-    TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(other, "{\"cmd\":\"arm\"}"), "\"error\":\"busy\""));
-    TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(other, "{\"cmd\":\"arm\",\"takeover\":true}"), "\"ok\":false"));
+    assert_reply_to(other, "{\"cmd\":\"arm\"}", "\"error\":\"busy\"");
+    assert_reply_to(other, "{\"cmd\":\"arm\",\"takeover\":true}", "\"ok\":false");
     daemon_rig_drive(client, 0, 0, 2000);
-    TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(other, "{\"cmd\":\"arm\"}"), "\"error\":\"busy\""));
-    TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(other, "{\"cmd\":\"arm\",\"takeover\":true}"), "\"ok\":true"));
+    assert_reply_to(other, "{\"cmd\":\"arm\"}", "\"error\":\"busy\"");
+    assert_reply_to(other, "{\"cmd\":\"arm\",\"takeover\":true}", "\"ok\":true");
     assert_reply("{\"cmd\":\"drive\",\"left_mm_s\":0,\"right_mm_s\":0}", "\"error\":\"not_holder\"");
     (void)close(other);
 }
@@ -219,14 +209,7 @@ TEST(test_arm_with_contradicted_setpoint_type_is_denied) {
 }
 
 static unsigned events_waiting(const char *name) {
-    static char text[1U << 20];
-    unsigned count = 0;
-    const ssize_t length = recv(client, text, sizeof text - 1U, MSG_DONTWAIT);
-    text[(length > 0) ? length : 0] = '\0';
-    for (const char *at = strstr(text, name); at != NULL; at = strstr(at + 1, name)) {
-        count++;
-    }
-    return count;
+    return daemon_rig_count(daemon_rig_receive(client), name);
 }
 
 TEST(test_telemetry_has_its_rate_without_burst_after_a_stall) {
@@ -240,45 +223,34 @@ TEST(test_telemetry_has_its_rate_without_burst_after_a_stall) {
 }
 
 TEST(test_telemetry_is_sent_in_the_cycle_in_which_it_is_due) {
-    char text[8192];
     assert_reply("{\"cmd\":\"watch\",\"topics\":[\"state\"],\"rate_hz\":5}", "\"ok\":true");
     sim_world_power(&daemon_rig.world, daemon_rig.now_us, false); // Otherwise each frame wakes the loop.
     daemon_rig_run(1000);
     for (unsigned event = 0; event < 5U; event++) {
         const iw_time_us_t due_us = daemon_rig.daemon->answers.served[0].client.next_us;
-        while (recv(client, text, sizeof text, MSG_DONTWAIT) > 0) { // Bytes of before
-        }
+        (void)daemon_rig_receive(client); // Bytes of before
         while (daemon_rig.now_us <= due_us) {
             daemon_rig_run(1);
         }
-        TEST_ASSERT_GREATER_THAN_INT(0, (int)recv(client, text, sizeof text, MSG_DONTWAIT));
+        TEST_ASSERT_TRUE(daemon_rig_receive(client)[0] != '\0');
     }
 }
 
 TEST(test_burst_of_requests_is_answered_in_one_cycle) {
-    static const char line[] = "{\"cmd\":\"why\"}\n";
-    static char text[65536];
-    unsigned answers = 0;
     for (unsigned i = 0; i < 3U * SOCK_LINES_PER_CYCLE; i++) {
-        TEST_ASSERT_EQUAL_INT((int)sizeof line - 1, (int)send(client, line, sizeof line - 1U, MSG_NOSIGNAL));
+        daemon_rig_send(client, "{\"cmd\":\"why\"}\n");
     }
     daemon_rig_run(1);
-    const ssize_t size = recv(client, text, sizeof text - 1U, MSG_DONTWAIT);
-    TEST_ASSERT_GREATER_THAN_INT(0, (int)size);
-    text[size] = '\0';
-    for (const char *at = strstr(text, "\"ok\":true"); at != NULL; at = strstr(at + 1, "\"ok\":true")) {
-        answers++;
-    }
-    TEST_ASSERT_EQUAL_UINT(3U * SOCK_LINES_PER_CYCLE, answers);
+    TEST_ASSERT_EQUAL_UINT(3U * SOCK_LINES_PER_CYCLE, daemon_rig_count(daemon_rig_receive(client), "\"ok\":true"));
 }
 
 TEST(test_stop_and_estop_need_no_lease) {
     const int other = daemon_rig_connect();
     daemon_rig_arm(client);
     daemon_rig_drive(client, 200, 200, 300);
-    TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(other, "{\"cmd\":\"stop\"}"), "\"state\":\"stopping\""));
+    assert_reply_to(other, "{\"cmd\":\"stop\"}", "\"state\":\"stopping\"");
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, daemon_rig_state());
-    TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(other, "{\"cmd\":\"estop\"}"), "\"state\":\"latched\""));
+    assert_reply_to(other, "{\"cmd\":\"estop\"}", "\"state\":\"latched\"");
     TEST_ASSERT_EQUAL_INT(0, daemon_rig.commanded_mm_s[IW_LEFT]);
     (void)close(other);
 }
@@ -289,8 +261,7 @@ TEST(test_lease_runs_from_the_command_not_from_the_last_poll) {
     for (unsigned ms = 1; ms < 20U; ms += 6U) { // At several times between two setpoints
         daemon_rig_drive(client, 100, 100, 200);
         daemon_rig_run(ms);
-        static const char line[] = "{\"cmd\":\"drive\",\"left_mm_s\":100,\"right_mm_s\":100}\n";
-        TEST_ASSERT_EQUAL_INT((int)sizeof line - 1, (int)send(client, line, sizeof line - 1U, MSG_NOSIGNAL));
+        daemon_rig_send(client, "{\"cmd\":\"drive\",\"left_mm_s\":100,\"right_mm_s\":100}\n");
         daemon_rig_run((unsigned)((lease_us - 500U) / IW_US_PER_MS));
         TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
     }
@@ -343,13 +314,9 @@ TEST(test_offset_change_is_sent_to_watchers_of_force) {
     daemon_rig_run(3000);
     assert_reply("{\"cmd\":\"watch\",\"topics\":[\"force\"],\"rate_hz\":1}", "\"ok\":true");
     (void)events_waiting("force");
-    static const char line[] = "{\"cmd\":\"tare\",\"side\":\"right\"}\n";
-    TEST_ASSERT_EQUAL_INT((int)sizeof line - 1, (int)send(client, line, sizeof line - 1U, MSG_NOSIGNAL));
+    daemon_rig_send(client, "{\"cmd\":\"tare\",\"side\":\"right\"}\n");
     daemon_rig_run(60);
-    static char text[8192];
-    const ssize_t size = recv(client, text, sizeof text - 1U, MSG_DONTWAIT);
-    TEST_ASSERT_GREATER_THAN_INT(0, (int)size);
-    text[size] = '\0';
+    const char *text = daemon_rig_receive(client);
     const char *offset_event = strstr(text, "\"event\":\"offset\"");
     TEST_ASSERT_NOT_NULL_MESSAGE(offset_event, text);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(offset_event, "\"side\":\"right\",\"offset_mN\":"), offset_event);
@@ -365,16 +332,13 @@ TEST(test_stop_names_the_client_that_asked_for_it) {
 
 TEST(test_still_moving_is_reported_once_as_a_complete_event) {
     gw_daemon_t *daemon = daemon_rig.daemon;
-    static char text[8192];
     assert_reply("{\"cmd\":\"watch\",\"topics\":[\"stop\"]}", "\"ok\":true");
     iw_snapshot_t seen = gw_wheels_snapshot(&daemon->wheels);
     seen.still_moving++;
     gw_answers_observe(&daemon->answers, &seen);
     gw_answers_observe(&daemon->answers, &seen);
     sock_service_flush(&daemon->clients, IW_CLIENT_NONE);
-    const ssize_t size = recv(client, text, sizeof text - 1U, MSG_DONTWAIT);
-    TEST_ASSERT_GREATER_THAN_INT(0, (int)size);
-    text[size] = '\0';
+    const char *text = daemon_rig_receive(client);
     const char *offset_event = strstr(text, "\"cause\":\"still_moving\",\"present\":true}");
     TEST_ASSERT_NOT_NULL_MESSAGE(offset_event, text);
     TEST_ASSERT_NULL(strstr(offset_event + strlen("\"cause\":\"still_moving"), "still_moving"));
@@ -382,7 +346,6 @@ TEST(test_still_moving_is_reported_once_as_a_complete_event) {
 
 /// Passes the daemon a snapshot with rolling wheels or not, and counts the matching events at a watcher.
 static unsigned count_reported(bool rolling, bool is_fault, const char *words) {
-    static char text[8192];
     gw_daemon_t *daemon = daemon_rig.daemon;
     iw_snapshot_t seen = gw_wheels_snapshot(&daemon->wheels);
     seen.rolling = rolling;
@@ -390,13 +353,7 @@ static unsigned count_reported(bool rolling, bool is_fault, const char *words) {
     gw_answers_observe(&daemon->answers, &seen);
     gw_answers_observe(&daemon->answers, &seen);
     sock_service_flush(&daemon->clients, IW_CLIENT_NONE);
-    const ssize_t size = recv(client, text, sizeof text - 1U, MSG_DONTWAIT);
-    text[(size > 0) ? size : 0] = '\0';
-    unsigned count = 0;
-    for (const char *at = strstr(text, words); at != NULL; at = strstr(at + 1, words)) {
-        count++;
-    }
-    return count;
+    return daemon_rig_count(daemon_rig_receive(client), words);
 }
 
 TEST(test_end_of_zeros_is_reported_in_advance) {

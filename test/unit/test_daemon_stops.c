@@ -7,7 +7,6 @@
 #include <string.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
-#include <sys/un.h>
 #include <unistd.h>
 
 #define STOP_WITHIN_MS 60U ///< Fault 33, on this machine
@@ -20,20 +19,9 @@ static int crowd[CROWD];
 static unsigned crowded;
 static char text[1U << 17];
 
-/// Connects while nothing of the gateway runs.
-static int knock(sock_right_t right) {
-    struct sockaddr_un address = {.sun_family = AF_UNIX};
-    socklen_t length = sizeof address;
-    const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0);
-    TEST_ASSERT_EQUAL_INT(
-        0, getsockname(daemon_rig.daemon->clients.listener[right].fd, (struct sockaddr *)&address, &length));
-    TEST_ASSERT_EQUAL_INT(0, connect(fd, (const struct sockaddr *)&address, length));
-    return fd;
-}
-
 static void join(sock_right_t right, unsigned count) {
     for (unsigned i = 0; i < count; i++) {
-        crowd[crowded++] = knock(right);
+        crowd[crowded++] = daemon_rig_knock(right);
         daemon_rig_run(2);
     }
 }
@@ -98,7 +86,7 @@ TEST(test_stop_never_refused_with_all_places_idle) {
     for (sock_right_t right = SOCK_DRIVE; right < SOCK_RIGHTS; right++) {
         for (size_t i = 0; i < sizeof stops / sizeof stops[0]; i++) {
             begin_driving();
-            const int fd = knock(right);
+            const int fd = daemon_rig_knock(right);
             send_lines(fd, stops[i]);
             assert_slower(stops[i]);
             daemon_rig_run(2);
@@ -118,9 +106,9 @@ TEST(test_stop_places_are_eight_on_each_socket) {
     take_all_places();
     for (sock_right_t right = SOCK_DRIVE; right < SOCK_RIGHTS; right++) {
         for (unsigned i = 0; i < SOCK_STOP_PLACES; i++) {
-            crowd[crowded++] = knock(right);
+            crowd[crowded++] = daemon_rig_knock(right);
         }
-        const int next = knock(right);
+        const int next = daemon_rig_knock(right);
         daemon_rig_run(SOCK_STOP_LEAST_US / IW_US_PER_MS - 1U);
         TEST_ASSERT_NOT_NULL_MESSAGE(strstr(receive(next), "too_many_clients"), text);
         TEST_ASSERT_TRUE(has_ended(next));
@@ -139,7 +127,7 @@ TEST(test_stop_never_refused_with_all_places_polling) {
                        "{\"cmd\":\"watch\",\"topics\":[\"state\",\"frame\"],\"rate_hz\":100}\n{\"cmd\":\"status\"}\n"
                        "{\"cmd\":\"why\"}\n{\"cmd\":\"status\"}\n{\"cmd\":\"status\"}\n{\"cmd\":\"why\"}\n");
         }
-        const int fd = knock(right);
+        const int fd = daemon_rig_knock(right);
         send_lines(fd, stops[1]);
         assert_slower("polling");
         (void)close(fd);
@@ -151,7 +139,7 @@ TEST(test_stop_never_refused_with_all_places_polling) {
 TEST(test_stop_never_refused_if_its_line_comes_later) {
     take_all_places();
     begin_driving();
-    const int fd = knock(SOCK_DRIVE);
+    const int fd = daemon_rig_knock(SOCK_DRIVE);
     daemon_rig_drive(client, 300, 300, 100);
     TEST_ASSERT_EQUAL_STRING_MESSAGE("", receive(fd), "no greeting: who waits for one does not stop");
     send_lines(fd, "{\"cmd\":");
@@ -167,7 +155,7 @@ TEST(test_stop_never_refused_without_descriptors) {
     take_all_places();
     begin_driving();
     TEST_ASSERT_EQUAL_INT(0, getrlimit(RLIMIT_NOFILE, &before));
-    const int fd = knock(SOCK_WATCH);
+    const int fd = daemon_rig_knock(SOCK_WATCH);
     send_lines(fd, stops[1]);
     const int lowest = dup(fd);
     (void)close(lowest);
@@ -187,7 +175,7 @@ static void flood(sock_right_t right, unsigned for_ms) {
         if (open_ones[next] > 0) {
             (void)close(open_ones[next]);
         }
-        open_ones[next] = knock(right);
+        open_ones[next] = daemon_rig_knock(right);
         next = (next + 1U) % 64U;
         daemon_rig_run(1);
     }
@@ -200,7 +188,7 @@ TEST(test_stop_never_refused_with_1000_connections_a_second) {
             flood(right, 300);
             begin_driving();
             flood(right, 100);
-            const int fd = knock(right);
+            const int fd = daemon_rig_knock(right);
             flood(right, later_ms);
             send_lines(fd, stops[later_ms % 3U]);
             flood(right, 30);
@@ -228,7 +216,7 @@ TEST(test_stop_place_for_anything_else_is_refused) {
     begin_driving();
     for (sock_right_t right = SOCK_DRIVE; right < SOCK_RIGHTS; right++) {
         for (size_t i = 0; i < sizeof others / sizeof others[0]; i++) {
-            const int fd = knock(right);
+            const int fd = daemon_rig_knock(right);
             send_lines(fd, others[i]);
             daemon_rig_drive(client, 300, 300, 20);
             TEST_ASSERT_NOT_NULL_MESSAGE(strstr(receive(fd), "\"error\":\"too_many_clients\""), others[i]);
@@ -244,7 +232,7 @@ TEST(test_stop_after_another_line_is_executed) {
     take_all_places();
     for (sock_right_t right = SOCK_DRIVE; right < SOCK_RIGHTS; right++) {
         begin_driving();
-        const int fd = knock(right);
+        const int fd = daemon_rig_knock(right);
         send_lines(
             fd,
             "{\"cmd\":\"reset\"}\n\n{\"cmd\":\"hello\"}\n{\"cmd\":\"status\"}\nstop\n{\"id\":7,\"cmd\":\"estop\"}\n");
@@ -302,7 +290,7 @@ TEST(test_stop_of_an_overflowing_holder_has_cause_client_stop) {
 
 TEST(test_stop_place_answers_one_line_and_all_stops) {
     take_all_places();
-    const int fd = knock(SOCK_DRIVE);
+    const int fd = daemon_rig_knock(SOCK_DRIVE);
     send_lines(fd,
                "{\"id\":1,\"cmd\":\"stop\"}\n{\"id\":2,\"cmd\":\"estop\"}\n{\"id\":3,\"cmd\":\"reset\",\"stop\":1}\n");
     daemon_rig_run(20);
@@ -340,7 +328,7 @@ static int knock_as(uid_t uid, sock_right_t right) {
     if (geteuid() != 0 || seteuid(uid) != 0) {
         return -1;
     }
-    const int fd = knock(right); // The socket has no name in the file system.
+    const int fd = daemon_rig_knock(right); // The socket has no name in the file system.
     TEST_ASSERT_EQUAL_INT(0, seteuid(0));
     return fd;
 }
@@ -386,7 +374,7 @@ TEST(test_stop_behind_other_lines_of_a_client_that_has_gone) {
     static const char *const others[] = {"{\"cmd\":\"status\"}\n", "{\"cmd\":\"hello\"}\n"};
     for (unsigned n = 0; n < 4U; n++) {
         begin_driving();
-        const int fd = knock((n < 2U) ? SOCK_DRIVE : SOCK_WATCH);
+        const int fd = daemon_rig_knock((n < 2U) ? SOCK_DRIVE : SOCK_WATCH);
         daemon_rig_run(2);
         static char lines[16384];
         lines[0] = '\0';
@@ -405,7 +393,7 @@ TEST(test_stop_behind_70_long_lines_of_a_client_that_has_gone) {
     static char lines[150000];
     size_t length = 0;
     begin_driving();
-    const int fd = knock(SOCK_DRIVE);
+    const int fd = daemon_rig_knock(SOCK_DRIVE);
     daemon_rig_run(2);
     for (unsigned i = 0; i < 70U; i++) {
         length +=
@@ -420,7 +408,7 @@ TEST(test_stop_in_a_stop_place_names_its_process) {
     char who[64];
     take_all_places();
     begin_driving();
-    const int fd = knock(SOCK_WATCH);
+    const int fd = daemon_rig_knock(SOCK_WATCH);
     send_lines(fd, stops[0]);
     assert_slower("named");
     (void)close(fd);

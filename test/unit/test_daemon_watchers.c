@@ -9,7 +9,6 @@
 #include <string.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
-#include <sys/un.h>
 #include <unistd.h>
 
 #define CROWD SOCK_WATCHERS_MAX
@@ -163,10 +162,8 @@ TEST(test_watchers_use_no_slot_of_a_driver) {
     const int second = daemon_rig_connect();
     assert_has(daemon_rig_ask(second, "{\"cmd\":\"hello\"}"), "\"rights\":\"drive\"");
     const int third = daemon_rig_connect();
-    char text[GW_CLIENT_TEXT_SIZE * 4U] = "";
     daemon_rig_run(STOP_MS);
-    TEST_ASSERT_GREATER_THAN_INT(0, recv(third, text, sizeof text - 1U, MSG_DONTWAIT));
-    assert_has(text, "raise max_clients");
+    assert_has(daemon_rig_receive(third), "raise max_clients");
     (void)close(second);
     (void)close(third);
 }
@@ -174,9 +171,8 @@ TEST(test_watchers_use_no_slot_of_a_driver) {
 TEST(test_watcher_beyond_the_limit_is_refused_until_one_ends) {
     daemon_rig.daemon->clients.most[SOCK_WATCH] = 2;
     connect_crowd(2);
-    char text[GW_CLIENT_TEXT_SIZE * 4U] = "";
     daemon_rig_run(STOP_MS);
-    TEST_ASSERT_GREATER_THAN_INT(0, recv(crowd[1], text, sizeof text - 1U, MSG_DONTWAIT));
+    const char *text = daemon_rig_receive(crowd[1]);
     assert_has(text, "2 watchers are connected");
     assert_has(text, "raise max_watchers");
     (void)close(crowd[0]);
@@ -209,14 +205,7 @@ TEST(test_watchers_with_many_requests_do_not_delay_a_driver) {
 
 /// Receives all bytes of this client and counts `words` in them.
 static unsigned taken_with(int client, const char *words) {
-    static char text[1U << 20];
-    unsigned count = 0;
-    const ssize_t length = recv(client, text, sizeof text - 1U, MSG_DONTWAIT);
-    text[(length > 0) ? length : 0] = '\0';
-    for (const char *at = strstr(text, words); at != NULL; at = strstr(at + 1, words)) {
-        count++;
-    }
-    return count;
+    return daemon_rig_count(daemon_rig_receive(client), words);
 }
 
 static unsigned replies_of(int client) {
@@ -361,14 +350,9 @@ TEST(test_estop_of_a_watcher_that_ends_immediately_latches) {
 
 TEST(test_flood_of_new_watchers_is_accepted_at_its_rate) {
     daemon_rig_keep_log();
-    struct sockaddr_un address = {.sun_family = AF_UNIX};
-    socklen_t length = sizeof address;
-    const sock_listener_t *listener = &daemon_rig.daemon->clients.listener[SOCK_WATCH];
-    TEST_ASSERT_EQUAL_INT(0, getsockname(listener->fd, (struct sockaddr *)&address, &length));
     daemon_rig_run(10);
     for (; crowded < 60U; crowded++) {
-        crowd[crowded] = socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0);
-        TEST_ASSERT_EQUAL_INT(0, connect(crowd[crowded], (const struct sockaddr *)&address, length));
+        crowd[crowded] = daemon_rig_knock(SOCK_WATCH);
     }
     daemon_rig.waits = 0;
     daemon_rig_run(9);
@@ -396,17 +380,13 @@ TEST(test_refused_watcher_is_logged_once_until_one_is_accepted) {
 
 TEST(test_client_without_descriptor_is_accepted_later) {
     sock_listener_t *listener = &daemon_rig.daemon->clients.listener[SOCK_DRIVE];
-    struct sockaddr_un address = {.sun_family = AF_UNIX};
-    socklen_t length = sizeof address;
     struct rlimit before;
     daemon_rig_keep_log();
-    TEST_ASSERT_EQUAL_INT(0, getsockname(listener->fd, (struct sockaddr *)&address, &length));
     if (listener->reserve_fd >= 0) {
         (void)close(listener->reserve_fd);
         listener->reserve_fd = -1;
     }
-    crowd[crowded] = socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0);
-    TEST_ASSERT_EQUAL_INT(0, connect(crowd[crowded++], (const struct sockaddr *)&address, length));
+    crowd[crowded++] = daemon_rig_knock(SOCK_DRIVE);
     TEST_ASSERT_EQUAL_INT(0, getrlimit(RLIMIT_NOFILE, &before));
     const int lowest = dup(watcher);
     (void)close(lowest);
@@ -427,26 +407,22 @@ TEST(test_client_without_descriptor_is_accepted_later) {
 }
 
 TEST(test_requests_sent_together_are_answered_in_order) {
-    char text[4096];
     send_line(driver, "{\"id\":71,\"cmd\":\"why\"}\n{\"id\":72,\"cmd\":\"hello\"}\n");
     daemon_rig_run(1);
-    const ssize_t length = recv(driver, text, sizeof text - 1U, MSG_DONTWAIT);
-    TEST_ASSERT_GREATER_THAN_INT(0, (int)length);
-    text[length] = '\0';
+    const char *text = daemon_rig_receive(driver);
     const char *first = strstr(text, "\"id\":71");
     TEST_ASSERT_NOT_NULL_MESSAGE(first, text);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(first, "\"id\":72"), text);
 }
 
 TEST(test_round_of_sending_ends_after_its_time) {
-    static char text[65536];
     connect_crowd(CROWD - 1U);
     for (unsigned i = 0; i < crowded; i++) {
         send_line(crowd[i], "{\"cmd\":\"watch\",\"topics\":[\"state\"]}\n");
     }
     daemon_rig_run(50);
     for (unsigned i = 0; i < crowded; i++) {
-        (void)recv(crowd[i], text, sizeof text, MSG_DONTWAIT);
+        (void)daemon_rig_receive(crowd[i]);
     }
     sock_clients_t *clients = &daemon_rig.daemon->clients;
     iwn_server_t *server = &daemon_rig.daemon->answers.server;
@@ -457,7 +433,7 @@ TEST(test_round_of_sending_ends_after_its_time) {
     daemon_rig.poll_takes_us = 0;
     unsigned reached = 0;
     for (unsigned i = 0; i < crowded; i++) {
-        reached += (recv(crowd[i], text, sizeof text, MSG_DONTWAIT) > 0) ? 1U : 0U;
+        reached += (daemon_rig_receive(crowd[i])[0] != '\0') ? 1U : 0U;
     }
     TEST_ASSERT_UINT_WITHIN(1, SOCK_ROUND_US / 100U, reached);
     TEST_ASSERT_TRUE(sock_service_is_busy(clients));
