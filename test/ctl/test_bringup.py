@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """iwheelctl bringup from start to end against simulated wheels that are not as assumed, and its ways out."""
 
+import json
 import os
 import re
 import shutil
@@ -9,11 +10,13 @@ import subprocess
 import tempfile
 import time
 import unittest
+from pathlib import Path
 
 from operator_at_terminal import Operator
 
 from bus import now_us
 from harness import Rig, children, find_program
+from trials import until
 from verdict import hold
 
 BUILD = os.environ["IWHEEL_BUILD"]
@@ -34,8 +37,7 @@ class Bringup(unittest.TestCase):
         self.addCleanup(self.folder.cleanup)
         self.out = os.path.join(self.folder.name, "mine.conf")
         self.records = os.path.join(self.folder.name, "records")
-        with open(self.out + ".from", "w", encoding="utf-8") as file:
-            file.write(f"[record]\ndirectory = {self.records}\n")
+        Path(self.out + ".from").write_text(f"[record]\ndirectory = {self.records}\n", encoding="utf-8")
         self.runtime = tempfile.mkdtemp(prefix="iwbr-", dir="/tmp")  # bringup uses a folder of at most 30 characters.
         self.addCleanup(self.nothing_left_behind)
         time.sleep(0.5)
@@ -57,23 +59,21 @@ class Bringup(unittest.TestCase):
             time.sleep(0.05)
 
     def start(self, *words, variables=None):
-        operator = Operator(
-            [
-                find_program(BUILD, "iwheelctl"),
-                "bringup",
-                self.out,
-                "--can",
-                f"unix:{self.rig.path('bus')}",
-                "--estop",
-                f"unix:{self.rig.path('button')}",
-                "--from",
-                self.out + ".from",
-                *words,
-            ],
-            variables or environment(self.runtime),
-        )
+        """Up to the checks."""
+        bus, button = (f"unix:{self.rig.path(name)}" for name in ("bus", "button"))
+        return self.start_from(self.out + ".from", "--can", bus, "--estop", button, *words, variables=variables)
+
+    def start_from(self, path, *words, variables=None):
+        operator = Operator([find_program(BUILD, "iwheelctl"), "bringup", self.out, "--from", path, *words], variables or environment(self.runtime))
         self.addCleanup(self.end, operator)
+        operator.answer("finger on the e-stop?", "y")
         return operator
+
+    def press_and_release(self, operator):
+        operator.expect("Press the e-stop button now")
+        self.rig.sim.ask("estop press")
+        operator.expect("Release it")
+        self.rig.sim.ask("estop release")
 
     def end(self, operator):
         self.killed = self.killed or operator.process.poll() is None
@@ -82,17 +82,13 @@ class Bringup(unittest.TestCase):
     def begin(self, *words, gear=False):
         """Through the checks and the e-stop, and past the gear."""
         operator = self.start(*words)
-        operator.answer("finger on the e-stop?", "y")
-        operator.expect("Press the e-stop button now")
-        self.rig.sim.ask("estop press")
-        operator.expect("Release it")
-        self.rig.sim.ask("estop release")
+        self.press_and_release(operator)
         if not gear:
             operator.answer("Turn the wheels by hand?", "n")
         return operator
 
     def leave(self, operator, seconds=20.0):
-        """Repeats and saves nothing. Returns the exit code."""
+        """Repeats and saves nothing."""
         end = time.monotonic() + seconds
         while operator.process.poll() is None and time.monotonic() < end:
             operator.pump(0.05)
@@ -100,7 +96,11 @@ class Bringup(unittest.TestCase):
             if asked:
                 operator.seen += asked.end()
                 operator.type("n\n")
-        return operator.wait()
+        self.assertEqual(1, operator.wait())
+
+    def quit_at(self, operator, question):
+        operator.answer(question, "q")
+        self.leave(operator)
 
     def moving(self):
         """Setpoints on the bus that are no zeros."""
@@ -111,15 +111,31 @@ class Bringup(unittest.TestCase):
         speeds = [speed for _, _, speed in self.rig.bus.setpoints(begin_us)]
         return any(speeds) and speeds[-1] == 0
 
+    def written(self):
+        return Path(self.out).read_text(encoding="utf-8")
+
     def value(self, section, key):
         here = None
-        with open(self.out, encoding="utf-8") as file:
-            for line in file:
-                if line.startswith("["):
-                    here = line.strip()
-                elif here == f"[{section}]" and line.startswith(f"{key} "):
-                    return line.split("=", 1)[1].split(";")[0].strip()
+        for line in self.written().splitlines():
+            if line.startswith("["):
+                here = line.strip()
+            elif here == f"[{section}]" and line.startswith(f"{key} "):
+                return line.split("=", 1)[1].split(";")[0].strip()
         raise AssertionError(f"no {section}.{key} in {self.out}")
+
+    def begin_first_try(self):
+        """Until the wheels are about to turn."""
+        operator = self.begin()
+        operator.answer("types to try", "1")
+        operator.expect("any key stops it")
+        return operator
+
+    def answer_after(self, command, operator, question, line):
+        """The wheels or the button change between the question and its answer."""
+        operator.expect(question)
+        self.rig.sim.ask(command)
+        operator.seen -= len(question)
+        operator.answer(question, line)
 
     def look_at_signs(self, operator, mirrored):
         for side in ("left", "right"):
@@ -128,9 +144,22 @@ class Bringup(unittest.TestCase):
         operator.answer("Now both", "")
         operator.answer("straight ahead?", "y")
 
-    def weigh(self, operator, side, mass_kg):
+    def skip_distance_and_track(self, operator):
+        operator.answer("Distance in m", "")
+        operator.answer("How many full turns", "")
+
+    def look_at_signs_only(self, operator):
+        """The signs as documented, and nothing is measured after them."""
+        self.look_at_signs(operator, mirrored=())
+        operator.answer("Measure the force?", "n")
+        self.skip_distance_and_track(operator)
+
+    def begin_to_weigh(self, operator, side, mass_kg=5):
         operator.answer(f"put on the {side} handle", str(mass_kg))
         operator.answer("from both handles", "")
+
+    def weigh(self, operator, side, mass_kg):
+        self.begin_to_weigh(operator, side, mass_kg)
         operator.expect("measuring")
         operator.expect("put the mass on")
         self.rig.sim.ask(f"load {side} {mass_kg * GRAVITY:.2f}")
@@ -138,13 +167,18 @@ class Bringup(unittest.TestCase):
         operator.expect("the unit is")
         self.rig.sim.ask(f"load {side} 0")
 
+    def move_and_enter(self, operator, *commands):
+        """One movement after the other."""
+        operator.expect("press Enter ...")
+        for command in commands:
+            self.rig.sim.ask(command)
+            self.wait_until_stands()
+        operator.type("\n")
+
     def turn_by_hand(self, operator, radius_mm, turns=(3, 3), answer="y"):
         operator.answer("Turn the wheels by hand?", "y")
         for side, turn in zip(("left", "right"), turns, strict=True):
-            operator.expect("press Enter ...")
-            self.rig.sim.ask(f"push {side} {turn * radius_mm * FULL_TURN_M_PER_MM:.3f}")
-            self.wait_until_stands()
-            operator.type("\n")
+            self.move_and_enter(operator, f"push {side} {turn * radius_mm * FULL_TURN_M_PER_MM:.3f}")
         if answer:
             operator.answer("Use that?", answer)
 
@@ -152,16 +186,15 @@ class Bringup(unittest.TestCase):
         """The machine as a whole; by other commands, if it does not go as it should."""
         operator.answer("How many full turns", str(turns))
         operator.answer("Point the machine at the mark", "")
-        operator.expect("press Enter ...")
-        for command in commands or (f"turn {turns}",):
-            self.rig.sim.ask(command)
-            self.wait_until_stands()
-        operator.type("\n")
+        self.move_and_enter(operator, *(commands or (f"turn {turns}",)))
+
+    def find_type(self, operator, types="1"):
+        operator.answer("types to try", types)
+        operator.answer("Did both wheels turn", "y")
 
     def drive_through(self, operator, signs=True):
         """Type, role and signs of wheels as documented."""
-        operator.answer("types to try", "1")
-        operator.answer("Did both wheels turn", "y")
+        self.find_type(operator)
         operator.answer("current_role", "")
         if signs:
             self.look_at_signs(operator, mirrored=())
@@ -172,26 +205,26 @@ class Bringup(unittest.TestCase):
         operator.answer("Write it to", "")
         self.assertEqual(0, operator.wait(), operator.text[-2000:])
         expected, found = None, {}
-        with open(self.out, encoding="utf-8") as file:
-            for line in file:
-                if line.startswith("; BRINGUP "):
-                    expected = line.split(", ", 1)[1].strip()
-                elif "=" in line and not line.startswith(";"):
-                    found[line.split(" = ")[0]], expected = expected, None
+        for line in self.written().splitlines():
+            if line.startswith("; BRINGUP "):
+                expected = line.split(", ", 1)[1].strip()
+            elif "=" in line and not line.startswith(";"):
+                found[line.split(" = ")[0]], expected = expected, None
         return found
 
-    def push(self, operator, distance_m, mirrored):
+    def push(self, operator, distance_m, left_m, right_m):
         operator.answer("Distance in m", str(distance_m))
         operator.answer("Place the machine at the start mark", "")
         operator.expect("press Enter ...")
-        for side in ("left", "right"):
-            self.rig.sim.ask(f"push {side} {-distance_m if side in mirrored else distance_m}")
+        self.rig.sim.ask(f"push left {left_m}")
+        self.rig.sim.ask(f"push right {right_m}")
+        self.stand_and_enter(operator)
+
+    def stand_and_enter(self, operator):
         self.wait_until_stands()
         operator.type("\n")
 
     def wait_until_stands(self):
-        import json
-
         time.sleep(0.2)
         while any(json.loads(self.rig.sim.ask("status"))[side]["speed_mm_s"] for side in ("left", "right")):
             time.sleep(0.05)
@@ -215,14 +248,13 @@ class Bringup(unittest.TestCase):
             file.write("[wheels]\ntrack_mm = 540\n")
         operator = self.begin(gear=True)
         self.turn_by_hand(operator, 160)
-        operator.answer("types to try", "0-7")
-        operator.answer("Did both wheels turn", "y")
+        self.find_type(operator, "0-7")
         operator.answer("current_role", "")
         self.look_at_signs(operator, mirrored=("left",))
         operator.answer("Measure the force?", "y")
         self.weigh(operator, "left", 5)
         self.weigh(operator, "right", 5)
-        self.push(operator, 5, mirrored=("left",))
+        self.push(operator, 5, -5, 5)
         operator.answer("Use the mean?", "y")
         self.turn_around(operator)
         operator.expect("The configured track is 540 mm")
@@ -260,8 +292,7 @@ class Bringup(unittest.TestCase):
             found,
         )
         self.assertAlmostEqual(160, int(self.value("wheels", "radius_mm")), delta=2)
-        with open(self.out, encoding="utf-8") as file:
-            text = file.read()
+        text = self.written()
         self.assertAlmostEqual(620, int(self.value("wheels", "track_mm")), delta=8)
         self.assertEqual(9, text.count(", confirmed: "), text)
         self.assertIn(f"The confirmed results are stored in {self.records}", " ".join(operator.text.split()))
@@ -312,13 +343,11 @@ class Bringup(unittest.TestCase):
     def test_current_that_is_a_setpoint_is_found_out(self):
         self.rig.sim.ask("role setpoint")
         operator = self.begin()
-        operator.answer("types to try", "7")
-        operator.answer("Did both wheels turn", "y")
+        self.find_type(operator, "7")
         operator.expect("it is a setpoint")
         operator.answer("current_role", "")
         self.look_at_signs(operator, mirrored=())
-        operator.answer("Measure the force?", "q")
-        self.assertEqual(1, self.leave(operator))
+        self.quit_at(operator, "Measure the force?")
         self.assertIn("Nothing was written", operator.text)
         self.assertFalse(os.path.exists(self.out))
 
@@ -327,10 +356,7 @@ class Bringup(unittest.TestCase):
         self.rig.sim.ask("role setpoint")
         operator = self.begin()
         operator.answer("types to try", "7")
-        operator.expect("Did both wheels turn")
-        self.rig.sim.ask("block both")
-        operator.seen -= len("Did both wheels turn")
-        operator.answer("Did both wheels turn", "y")
+        self.answer_after("block both", operator, "Did both wheels turn", "y")
         return operator
 
     def test_wheel_blocked_in_current_test_is_found_by_turning_zero(self):
@@ -358,8 +384,7 @@ class Bringup(unittest.TestCase):
     def test_silence_of_a_wheel_during_a_try_is_no_finding(self):
         self.rig.sim.ask("role setpoint")
         operator = self.begin()
-        operator.answer("types to try", "7")
-        operator.answer("Did both wheels turn", "y")
+        self.find_type(operator, "7")
         operator.expect("any key stops it")
         self.rig.sim.ask("mute left")
         self.assertRegex(operator.expect("Try again?"), "left wheel (is )?(offline|not heard|sent no telemetry)")
@@ -377,8 +402,7 @@ class Bringup(unittest.TestCase):
         operator.expect("98 setpoints have a speed, with type 3")
         operator.expect("have 8 bytes")
         operator.answer("types to try", "")
-        operator.answer("Did both wheels turn", "q")
-        self.assertEqual(1, self.leave(operator))
+        self.quit_at(operator, "Did both wheels turn")
         self.assertEqual({8}, {len(frame.data) for frame in self.rig.bus.frames if frame.id in (266, 298)})
 
     def test_recording_without_a_speed_leaves_the_types_to_try(self):
@@ -389,23 +413,17 @@ class Bringup(unittest.TestCase):
         operator.expect("has no setpoint with a speed")
         operator.expect("types to try [0-7] ")
         operator.type("q\n")
-        self.assertEqual(1, self.leave(operator))
+        self.leave(operator)
 
     def test_any_key_stops_the_wheels_immediately(self):
-        operator = self.begin()
-        operator.answer("types to try", "1")
-        operator.expect("any key stops it")
-        deadline = time.monotonic() + 5
-        while not self.moving() and time.monotonic() < deadline:
-            time.sleep(0.02)
-        self.assertTrue(self.moving())
-        pressed_us = time.clock_gettime_ns(time.CLOCK_MONOTONIC) // 1000
+        operator = self.begin_first_try()
+        until(self.moving, 5, "the wheels are commanded to turn")
+        pressed_us = now_us()
         operator.type(" ")
         operator.expect("STOPPED: a key was pressed")
         late = [frame for frame in self.moving() if frame[0] > pressed_us + 150_000]
         self.assertFalse(late, "nonzero setpoints after the key")
-        operator.answer("Try again?", "q")
-        self.assertEqual(1, self.leave(operator))
+        self.quit_at(operator, "Try again?")
 
     def test_key_before_or_after_the_motion_stops_the_wheels_too(self):
         operator = self.begin()
@@ -429,8 +447,7 @@ class Bringup(unittest.TestCase):
             operator.pump(0.005)
         operator.type(" ")  # The zeros of the stop are still sent, for 0.2 s.
         operator.expect("STOPPED: a key was pressed", 3)
-        operator.answer("Try again?", "q")
-        self.assertEqual(1, self.leave(operator))
+        self.quit_at(operator, "Try again?")
 
     def test_no_type_that_moves_asks_again_and_stores_none(self):
         self.rig.sim.ask("type 200")
@@ -439,40 +456,34 @@ class Bringup(unittest.TestCase):
         operator.expect("Types are numbers")
         operator.answer("types to try", "0-1")
         operator.expect("None of these moved both wheels")
-        operator.answer("types to try", "q")
-        self.assertEqual(1, self.leave(operator))
+        self.quit_at(operator, "types to try")
         self.assertFalse(os.path.exists(self.out))
 
     def test_exchanged_wheels_end_it_with_the_fix(self):
         operator = self.begin()
-        operator.answer("types to try", "1")
-        operator.answer("Did both wheels turn", "y")
+        self.find_type(operator)
         operator.answer("current_role", "limit")
         operator.answer("Watch the left wheel", "")
         operator.answer("r: repeat)", "o")
         operator.expect("exchange the wheels")
-        self.assertEqual(1, self.leave(operator))
+        self.leave(operator)
 
     def test_feedback_of_wrong_sign_ends_bringup_with_the_reason(self):
         self.rig.sim.ask("sign right swapped")
         operator = self.begin()
-        operator.answer("types to try", "1")
-        operator.answer("Did both wheels turn", "y")
+        self.find_type(operator)
         operator.answer("current_role", "limit")
         operator.answer("Watch the left wheel", "")
         operator.answer("r: repeat)", "f")
         operator.answer("Watch the right wheel", "")
         operator.expect("measures the opposite")
-        self.assertEqual(1, self.leave(operator))
+        self.leave(operator)
 
     def test_interrupt_while_wheels_turn_stops_them_and_cleans_up(self):
-        operator = self.begin()
-        operator.answer("types to try", "1")
-        operator.expect("any key stops it")
+        operator = self.begin_first_try()
         time.sleep(0.5)
         operator.type("\x03")
-        operator.answer("Try again?", "q")
-        self.assertEqual(1, self.leave(operator))
+        self.quit_at(operator, "Try again?")
         self.assertIn("STOPPED", operator.text)
         time.sleep(0.3)
         quiet = len(self.rig.bus.setpoints())
@@ -480,9 +491,7 @@ class Bringup(unittest.TestCase):
         self.assertEqual(quiet, len(self.rig.bus.setpoints()), "nothing is sent any more")
 
     def test_killed_bringup_ends_its_gateway(self):
-        operator = self.begin()
-        operator.answer("types to try", "1")
-        operator.expect("any key stops it")
+        operator = self.begin_first_try()
         time.sleep(0.5)
         self.killed = True
         self.assertEqual(1, len(os.listdir(self.runtime)))
@@ -511,29 +520,22 @@ class Bringup(unittest.TestCase):
     def test_nothing_goes_without_the_checks_or_the_press(self):
         self.rig.sim.ask("mute right")
         operator = self.start()
-        operator.answer("finger on the e-stop?", "y")
         operator.expect("Fix the failed checks")
-        self.assertEqual(1, self.leave(operator))
+        self.leave(operator)
         hold(not self.rig.bus.setpoints(), "setpoints without the checks")
 
     def test_existing_file_is_replaced_after_a_question_and_saved(self):
-        with open(self.out, "w", encoding="utf-8") as file:
-            file.write("; precious\n")
+        Path(self.out).write_text("; precious\n", encoding="utf-8")
         operator = self.begin()
-        operator.answer("types to try", "1")
-        operator.answer("Did both wheels turn", "y")
+        self.find_type(operator)
         operator.answer("current_role", "limit")
-        self.look_at_signs(operator, mirrored=())
-        operator.answer("Measure the force?", "n")
-        operator.answer("Distance in m", "")
-        operator.answer("How many full turns", "")
+        self.look_at_signs_only(operator)
         operator.answer("Write it to", "")
         operator.answer("Replace it?", "")
         operator.answer("Write it to", "")
         operator.answer("Replace it?", "y")
         self.assertEqual(0, operator.wait(), operator.text[-1500:])
-        with open(self.out + ".old", encoding="utf-8") as file:
-            self.assertEqual("; precious\n", file.read())
+        self.assertEqual("; precious\n", Path(self.out + ".old").read_text(encoding="utf-8"))
         self.assertEqual("192", self.value("wheels", "radius_mm"))
         self.assertIn("iwheelctl confirm mount_sign_left no --how 'bringup: the operator saw it turn forwards with invert = no'", operator.text)
 
@@ -542,16 +544,11 @@ class Bringup(unittest.TestCase):
     def test_estop_that_is_pressed_from_the_start_is_no_press(self):
         self.rig.sim.ask("estop press")
         operator = self.start()
-        operator.answer("finger on the e-stop?", "y")
         operator.expect("reads as pressed already")
         self.assertNotIn("Press the e-stop button now", operator.text)
         self.rig.sim.ask("estop release")
-        operator.expect("Press the e-stop button now")
-        self.rig.sim.ask("estop press")
-        operator.expect("Release it")
-        self.rig.sim.ask("estop release")
-        operator.answer("Turn the wheels by hand?", "q")
-        self.assertEqual(1, self.leave(operator))
+        self.press_and_release(operator)
+        self.quit_at(operator, "Turn the wheels by hand?")
 
     def test_gear_from_wrong_or_missing_turns_is_not_concluded(self):
         operator = self.begin(gear=True)
@@ -561,23 +558,17 @@ class Bringup(unittest.TestCase):
             ((), "fit no gear ratio"),
             (("push left 3.6", "push left -1.8", "push left 1.8"), "back and forth"),
         ):
-            operator.expect("press Enter ...")
-            for push in pushes:
-                self.rig.sim.ask(push)
-                self.wait_until_stands()
-            operator.type("\n")
+            self.move_and_enter(operator, *pushes)
             operator.expect("The right wheel counted" if expected == "RIGHT" else expected)
             operator.answer("Try again?", "y" if expected != "back and forth" else "n")
         operator.expect("The gear is unchanged")
-        operator.answer("types to try", "q")
-        self.assertEqual(1, self.leave(operator))
+        self.quit_at(operator, "types to try")
 
     def test_gear_that_differs_from_wheel_to_wheel_is_none(self):
         operator = self.begin(gear=True)
         self.turn_by_hand(operator, 192, turns=(3, 4), answer=None)
         operator.expect("The gear is unchanged")
-        operator.answer("types to try", "q")
-        self.assertEqual(1, self.leave(operator))
+        self.quit_at(operator, "types to try")
 
     def test_gear_with_unknown_rpm_reference_is_not_confirmed(self):
         for command in ("gear both 4", "rpm left rotor"):
@@ -587,8 +578,7 @@ class Bringup(unittest.TestCase):
         self.assertIn("whether rpm counts the wheel or the rotor was not measured", operator.text.replace("\n", " "))
         self.rig.sim.ask("rpm left wheel")
         self.drive_through(operator)
-        operator.answer("Distance in m", "")
-        operator.answer("How many full turns", "")
+        self.skip_distance_and_track(operator)
         found = self.write(operator)
         self.assertRegex(found["gear_ratio"], "^noted: .* ticks in 3 turns by hand; whether rpm counts the wheel or the rotor was not measured$")
         self.assertIsNone(found["rpm_of"])
@@ -598,11 +588,9 @@ class Bringup(unittest.TestCase):
         for command in ("gear both 2", "rpm both rotor"):
             self.rig.sim.ask(command)
         operator = self.begin()
-        operator.answer("types to try", "1")
-        operator.answer("Did both wheels turn", "y")
+        self.find_type(operator)
         operator.expect("notes it as not confirmed")
-        operator.answer("current_role", "q")
-        self.assertEqual(1, self.leave(operator))
+        self.quit_at(operator, "current_role")
 
     def test_type_that_turns_one_wheel_only_is_not_accepted(self):
         self.rig.sim.ask("block right")
@@ -610,25 +598,18 @@ class Bringup(unittest.TestCase):
         operator.answer("types to try", "1")
         operator.expect("Only the left wheel turned")
         operator.expect("None of these moved both wheels")
-        operator.answer("types to try", "q")
-        self.assertEqual(1, self.leave(operator))
+        self.quit_at(operator, "types to try")
 
     def test_wheels_that_cannot_turn_are_no_limit(self):
         operator = self.begin()
         operator.answer("types to try", "1")
-        operator.expect("Did both wheels turn")
-        self.rig.sim.ask("block both")
-        operator.seen -= len("Did both wheels turn")
-        operator.answer("Did both wheels turn", "y")
+        self.answer_after("block both", operator, "Did both wheels turn", "y")
         operator.expect("the result counts only if both wheels turn")
         operator.expect("Now no wheel turned")
         self.rig.sim.ask("unblock both")
         self.assertEqual("?", self.offered(operator, "current_role"))
         operator.type("limit\n")
-        self.look_at_signs(operator, mirrored=())
-        operator.answer("Measure the force?", "n")
-        operator.answer("Distance in m", "")
-        operator.answer("How many full turns", "")
+        self.look_at_signs_only(operator)
         self.assertEqual("noted: typed by the operator; the wheels did not show it", self.write(operator)["current_role"])
         self.assertNotIn("confirm current_role", operator.text)
 
@@ -636,18 +617,12 @@ class Bringup(unittest.TestCase):
         self.rig.sim.ask("role setpoint")
         operator = self.begin()
         operator.answer("types to try", "1")
-        operator.expect("Did both wheels turn")
-        self.rig.sim.ask("block right")
-        operator.seen -= len("Did both wheels turn")
-        operator.answer("Did both wheels turn", "y")
+        self.answer_after("block right", operator, "Did both wheels turn", "y")
         operator.expect("The current alone turned the left wheel")
         operator.expect("only one wheel showed it")
         self.rig.sim.ask("unblock right")
         operator.answer("current_role", "")
-        self.look_at_signs(operator, mirrored=())
-        operator.answer("Measure the force?", "n")
-        operator.answer("Distance in m", "")
-        operator.answer("How many full turns", "")
+        self.look_at_signs_only(operator)
         self.assertEqual("noted: 250 mA without speed turned the left wheel", self.write(operator)["current_role"])
         self.assertEqual("setpoint", self.value("wheels", "current_role"))
 
@@ -657,40 +632,31 @@ class Bringup(unittest.TestCase):
         for side in ("left", "right"):
             operator.answer(f"Watch the {side} wheel", "")
             operator.answer("r: repeat)", "f")
-        operator.expect("Now both")
-        self.rig.sim.ask("block left")
-        operator.seen -= len("Now both")
-        operator.answer("Now both", "")
+        self.answer_after("block left", operator, "Now both", "")
         operator.expect("The bus shows that a wheel did not turn forwards")
         self.rig.sim.ask("unblock left")
         self.look_at_signs(operator, mirrored=())
-        operator.answer("Measure the force?", "q")
-        self.assertEqual(1, self.leave(operator))
+        self.quit_at(operator, "Measure the force?")
 
     def test_wheel_that_turns_uncommanded_ends_the_signs(self):
         operator = self.begin()
         self.drive_through(operator, signs=False)
-        operator.expect("Watch the left wheel")
-        self.rig.sim.ask("runaway right on 80")
-        operator.seen -= len("Watch the left wheel")
-        operator.answer("Watch the left wheel", "")
+        self.answer_after("runaway right on 80", operator, "Watch the left wheel", "")
         operator.expect("BOTH wheels turned")
-        self.assertEqual(1, self.leave(operator))
+        self.leave(operator)
 
     def test_force_that_ends_sways_or_saturates_is_no_unit(self):
         operator = self.begin()
         self.drive_through(operator, signs=False)
         self.look_at_signs(operator, mirrored=())
         operator.answer("Measure the force?", "y")
-        operator.answer("put on the left handle", "5")
-        operator.answer("from both handles", "")
+        self.begin_to_weigh(operator, "left")
         operator.expect("put the mass on")
         self.rig.sim.ask("raw left 32767")
         operator.type("\n")
         operator.expect("at the end of its range")
         operator.answer("Try again?", "n")
-        operator.answer("put on the right handle", "5")
-        operator.answer("from both handles", "")
+        self.begin_to_weigh(operator, "right")
         operator.expect("put the mass on")
         self.rig.sim.ask("load right 49")
         operator.type("\n")
@@ -699,13 +665,12 @@ class Bringup(unittest.TestCase):
         self.rig.sim.ask("load right 250")
         operator.expect("The force swayed")
         operator.answer("Try again?", "n")
-        operator.answer("Distance in m", "q")
-        self.assertEqual(1, self.leave(operator))
+        self.quit_at(operator, "Distance in m")
 
     def test_radius_and_track_rest_on_gear_and_distance_and_say_so(self):
         operator = self.begin()
         self.drive_through(operator)
-        self.push(operator, 3, mirrored=())
+        self.push(operator, 3, 3, 3)
         operator.expect("if the gear is as configured: it was not measured")
         operator.answer("Use the mean?", "y")
         self.turn_around(operator)
@@ -719,13 +684,7 @@ class Bringup(unittest.TestCase):
         operator = self.begin(gear=True)
         self.turn_by_hand(operator, 192)
         self.drive_through(operator)
-        operator.answer("Distance in m", "3")
-        operator.answer("Place the machine at the start mark", "")
-        operator.expect("press Enter ...")
-        for command in ("push left 3", "push right 3.3"):
-            self.rig.sim.ask(command)
-        self.wait_until_stands()
-        operator.type("\n")
+        self.push(operator, 3, 3, 3.3)
         operator.expect("it was a curve")
         operator.answer("Use the mean?", "y")
         self.turn_around(operator)
@@ -757,8 +716,7 @@ class Bringup(unittest.TestCase):
         operator.answer("How many full turns", "")
         operator.expect("Without a track the gateway refuses arm: set track_mm under [wheels]")
         self.assertNotIn("track_mm", self.write(operator))
-        with open(self.out, encoding="utf-8") as file:
-            self.assertIn("\n;track_mm = ?", file.read())
+        self.assertIn("\n;track_mm = ?", self.written())
         self.assertFalse([frame for frame in self.rig.bus.frames[-200:] if frame.id in (266, 298)], "nothing was sent")
 
     def freeze(self, process_number, seconds):
@@ -773,24 +731,20 @@ class Bringup(unittest.TestCase):
         for gateway in (False, True):  # The wheels count on, and nothing of it is lost.
             self.begin_to_turn(operator)
             self.freeze(children(operator.process.pid)["iwheel-gateway"] if gateway else operator.process.pid, 0.8)
-            self.wait_until_stands()
-            operator.type("\n")
+            self.stand_and_enter(operator)
             self.assertRegex(operator.expect("No track was configured"), r"in 3\s+turns: the\s+track\s+is 5[34]\d\s+mm")
             operator.answer("Use that?", "n")
         self.begin_to_turn(operator)
         self.rig.sim.ask("mute left")
         time.sleep(1.5)
         self.rig.sim.ask("unmute left")
-        self.wait_until_stands()
-        operator.type("\n")
+        self.stand_and_enter(operator)
         operator.expect("The wheels were offline for a while")
         self.begin_to_turn(operator)
         self.freeze(operator.process.pid, 2.5)
-        self.wait_until_stands()
-        operator.type("\n")
+        self.stand_and_enter(operator)
         operator.expect("too busy to follow the wheels")
-        operator.answer("How many full turns", "q")
-        self.assertEqual(1, self.leave(operator))
+        self.quit_at(operator, "How many full turns")
 
     def begin_to_turn(self, operator):
         operator.answer("How many full turns", "3")
@@ -804,23 +758,14 @@ class Bringup(unittest.TestCase):
     def test_disturbed_step_is_repeated_by_enter(self):
         operator = self.begin()
         operator.answer("types to try", "1")
-        operator.expect("Did both wheels turn")
-        self.rig.sim.ask("estop press")
-        operator.seen -= len("Did both wheels turn")
-        operator.answer("Did both wheels turn", "y")
+        self.answer_after("estop press", operator, "Did both wheels turn", "y")
         operator.answer("Try again?", "n")
         moved = len(self.moving())
-        operator.expect("Do it again?")
-        self.rig.sim.ask("estop release")
-        operator.seen -= len("Do it again?")
-        operator.answer("Do it again?", "")
+        self.answer_after("estop release", operator, "Do it again?", "")
         operator.expect("Step 5 of 10")
         operator.answer("current_role", "")
         self.assertGreater(len(self.moving()), moved)
-        self.look_at_signs(operator, mirrored=())
-        operator.answer("Measure the force?", "n")
-        operator.answer("Distance in m", "")
-        operator.answer("How many full turns", "")
+        self.look_at_signs_only(operator)
         found = self.write(operator)
         self.assertTrue(found["current_role"].startswith("confirmed: "), found)
 
@@ -837,16 +782,10 @@ class Bringup(unittest.TestCase):
 
     def go_on(self, path, same):
         """Continues with the saved file, through the checks and the e-stop."""
-        command = [find_program(BUILD, "iwheelctl"), "bringup", self.out, "--from", path]
-        operator = Operator(command, environment(self.runtime))
-        self.addCleanup(self.end, operator)
-        operator.answer("finger on the e-stop?", "y")
+        operator = self.start_from(path)
         if same:
             operator.answer("The same wheels, mounted in the same way?", same)
-        operator.expect("Press the e-stop button now")
-        self.rig.sim.ask("estop press")
-        operator.expect("Release it")
-        self.rig.sim.ask("estop release")
+        self.press_and_release(operator)
         operator.answer("Turn the wheels by hand?", "n")
         return operator
 
@@ -854,32 +793,23 @@ class Bringup(unittest.TestCase):
         operator = self.go_on(self.save(), same="y")
         operator.expect("Step 4 of 10: confirmed by the earlier bringup; skipped")
         operator.expect("Step 5 of 10: confirmed by the earlier bringup; skipped")
-        self.look_at_signs(operator, mirrored=())
-        operator.answer("Measure the force?", "n")
-        operator.answer("Distance in m", "")
-        operator.answer("How many full turns", "")
+        self.look_at_signs_only(operator)
         found = self.write(operator)
         self.assertEqual(("1", "limit"), (self.value("wheels", "setpoint_type"), self.value("wheels", "current_role")))
         for key in ("setpoint_type", "current_role", "invert"):
             self.assertTrue(found[key].startswith("confirmed: "), found)
-        with open(self.out, encoding="utf-8") as file:
-            self.assertNotIn("BRINGUP SAVED", file.read())
+        self.assertNotIn("BRINGUP SAVED", self.written())
 
     def test_saved_results_of_other_wheels_do_not_count(self):
         operator = self.go_on(self.save(), same="n")
-        operator.answer("types to try", "q")
-        self.assertEqual(1, self.leave(operator))
+        self.quit_at(operator, "types to try")
 
     def test_saved_results_in_a_changed_file_do_not_count(self):
-        path = self.save()
-        with open(path, encoding="utf-8") as file:
-            text = file.read()
-        with open(path, "w", encoding="utf-8") as file:
-            file.write(text.replace("setpoint_type = 1 ", "setpoint_type = 2 "))
-        operator = self.go_on(path, same=None)
+        saved = Path(self.save())
+        saved.write_text(saved.read_text(encoding="utf-8").replace("setpoint_type = 1 ", "setpoint_type = 2 "), encoding="utf-8")
+        operator = self.go_on(str(saved), same=None)
         self.assertIn("was changed after bringup had saved it", " ".join(operator.text.split()))
-        operator.answer("types to try", "q")
-        self.assertEqual(1, self.leave(operator))
+        self.quit_at(operator, "types to try")
 
     # --- ways out, and nothing left behind (see nothing_left_behind) ----------------------------------------------
 
@@ -892,7 +822,6 @@ class Bringup(unittest.TestCase):
 
     def test_interrupt_while_it_waits_for_the_estop_ends_it(self):
         operator = self.start()
-        operator.answer("finger on the e-stop?", "y")
         operator.expect("Press the e-stop button now")
         time.sleep(0.2)
         operator.type("\x03")
@@ -911,8 +840,7 @@ class Bringup(unittest.TestCase):
         self.drive_through(operator, signs=False)
         self.look_at_signs(operator, mirrored=())
         operator.answer("Measure the force?", "y")
-        operator.answer("put on the left handle", "5")
-        operator.answer("from both handles", "")
+        self.begin_to_weigh(operator, "left")
         operator.expect("measuring for 2 s")
         operator.type("\x03")
         self.ends_soon(operator)
@@ -927,10 +855,9 @@ class Bringup(unittest.TestCase):
 
     def test_folder_in_tmp_without_runtime_directory_is_removed(self):
         operator = self.start(variables=environment())
-        operator.answer("finger on the e-stop?", "y")
         operator.expect("Press the e-stop button now")
-        with open(f"/proc/{children(operator.process.pid)['iwheel-gateway']}/cmdline", "rb") as file:
-            folder = os.path.dirname(file.read().split(b"\0")[2].decode())
+        command = Path(f"/proc/{children(operator.process.pid)['iwheel-gateway']}/cmdline").read_bytes()
+        folder = os.path.dirname(command.split(b"\0")[2].decode())
         self.assertRegex(folder, "^/tmp/iwheel-bringup-")
         self.rig.sim.ask("estop press")  # A stop, which the gateway records.
         operator.expect("Release it")
@@ -948,7 +875,7 @@ class Bringup(unittest.TestCase):
         self.addCleanup(operator.close)
         operator.answer("finger on the e-stop?", "y")
         operator.expect("A gateway already runs on this bus")
-        self.assertEqual(1, self.leave(operator))
+        self.leave(operator)
 
     def test_end_of_input_ends_it_and_wrong_words_are_usage(self):
         program = find_program(BUILD, "iwheelctl")
