@@ -15,17 +15,16 @@ import threading
 import time
 import unittest
 import zlib
+from pathlib import Path
 
+import ctl
 import pytest
 from client import Streamer
-from harness import Rig, children, find_program
-
-BUILD = os.environ["IWHEEL_BUILD"]
+from harness import Rig, children
 
 
 def read(path):
-    with open(path, encoding="utf-8") as file:
-        return file.read()
+    return Path(path).read_text(encoding="utf-8")
 
 
 # A busy machine starves the simulated wheels now and then; that is not what is tried here.
@@ -37,7 +36,9 @@ class WithRig(unittest.TestCase):
     sim_args = ()
 
     def setUp(self):
-        self.rig = Rig(BUILD, config={**PATIENT, **self.config, "record": {"directory": "/nowhere", **self.config.get("record", {})}}, sim_args=self.sim_args)
+        self.rig = Rig(
+            ctl.BUILD, config={**PATIENT, **self.config, "record": {"directory": "/nowhere", **self.config.get("record", {})}}, sim_args=self.sim_args
+        )
         self.addCleanup(self.rig.close)
         self.folder = self.rig.path("records")
         self.rig.settings["record"]["directory"] = self.folder
@@ -46,10 +47,7 @@ class WithRig(unittest.TestCase):
         self.client = self.rig.client("tester")
 
     def ctl(self, *words):
-        done = subprocess.run(
-            [find_program(BUILD, "iwheelctl"), "--socket", self.rig.path("gateway.sock"), *words], capture_output=True, text=True, timeout=60, check=False
-        )
-        return done.returncode, done.stdout, done.stderr
+        return ctl.run("--socket", self.rig.path("gateway.sock"), *words)
 
     def drive(self, seconds, left=300, right=200):
         self.assertTrue(self.client.request("arm", name="tester")["ok"])
@@ -196,8 +194,7 @@ class BlackBox(WithRig):
         end = time.monotonic() + 3
         while os.path.isdir(self.folder) and time.monotonic() < end:  # The gateway's own helpers write their last file after it.
             shutil.rmtree(self.folder, ignore_errors=True)
-        with open(self.folder, "w", encoding="ascii"):
-            pass
+        Path(self.folder).touch()
         self.rig.start_gateway()
         self.client = self.rig.client("again")
         self.assertIn("no recording can be written to " + self.folder, self.rig.gateway.text())
@@ -217,7 +214,7 @@ class OverTheSocket(WithRig):
 
     def away(self, *words):
         """As from another machine: in a name space in which there is another folder in its place."""
-        command = [find_program(BUILD, "iwheelctl"), "--socket", self.rig.path("gateway.sock"), *words]
+        command = [ctl.program(), "--socket", self.rig.path("gateway.sock"), *words]
         hidden = [*self.unshare, "sh", "-c", 'mount -t tmpfs none "$0" && exec "$@"', self.folder]
         done = subprocess.run(hidden + command, capture_output=True, text=True, timeout=60, check=False)
         return done.returncode, done.stdout, done.stderr
@@ -266,6 +263,18 @@ class OverTheSocket(WithRig):
 class Pieces(WithRig):
     """The requests themselves."""
 
+    def connect(self):
+        sock = socket.socket(socket.AF_UNIX)
+        self.addCleanup(sock.close)
+        sock.connect(self.rig.path("gateway.sock"))
+        return sock
+
+    def reset(self):
+        """Over the latch of the first stop."""
+        self.rig.release()
+        time.sleep(1.2)
+        self.assertTrue(self.client.request("reset")["ok"])
+
     def fetch(self, name):
         data = b""
         while True:
@@ -287,15 +296,13 @@ class Pieces(WithRig):
         self.assertEqual(("stop-000001-estop_line", "estop_line"), (entry["name"], entry["cause"]))
         self.assertLess(abs(entry["wall_us"] / 1e6 - time.time()), 30)
         for ending in ("log", "jsonl", "conf"):
-            with open(f"{stem}.{ending}", "rb") as file:
-                data = file.read()
+            data = Path(f"{stem}.{ending}").read_bytes()
             self.assertEqual(len(data), entry[f"{ending}_bytes"])
             self.assertEqual(data, self.fetch(f"stop-000001-estop_line.{ending}"))
 
     def test_nothing_else_is_read(self):
         self.stop_by_button()
-        with open(os.path.join(self.folder, "secret"), "w", encoding="ascii") as file:
-            file.write("secret")
+        Path(self.folder, "secret").write_text("secret", encoding="ascii")
         os.symlink("secret", os.path.join(self.folder, "stop-000005-a.log"))
         for name in (
             "secret",
@@ -319,14 +326,10 @@ class Pieces(WithRig):
 
     def test_reader_frozen_or_killed_delays_no_stop_or_recording(self):
         self.stop_by_button()
-        self.rig.release()
-        time.sleep(1.2)
-        self.assertTrue(self.client.request("reset")["ok"])
+        self.reset()
         reader = children(self.rig.gateway.child.pid)["iwheel-records"]
         os.kill(reader, signal.SIGSTOP)
-        sock = socket.socket(socket.AF_UNIX)
-        self.addCleanup(sock.close)
-        sock.connect(self.rig.path("gateway.sock"))
+        sock = self.connect()
         lines = sock.makefile("r", encoding="utf-8")
         lines.readline()
         sock.sendall(b'{"cmd":"recordings","id":1}\n{"cmd":"recordings","id":2}\n{"cmd":"estop","id":3}\n{"cmd":"status","id":4}\n')
@@ -346,9 +349,7 @@ class Pieces(WithRig):
         self.assertTrue(self.client.request("status")["ok"])
 
     def test_question_of_who_says_nothing_more_is_answered(self):
-        sock = socket.socket(socket.AF_UNIX)
-        self.addCleanup(sock.close)
-        sock.connect(self.rig.path("gateway.sock"))
+        sock = self.connect()
         sock.sendall(b'{"cmd":"recordings","id":1}\n')
         sock.shutdown(socket.SHUT_WR)
         lines = sock.makefile("r", encoding="utf-8").read().splitlines()  # To the end of the file.
@@ -363,9 +364,8 @@ class Pieces(WithRig):
     def test_reading_large_recording_does_not_delay_the_loop(self):
         stem = self.stop_by_button()
         self.rig.release()
-        large = os.path.join(self.folder, "stop-000002-estop_line.log")
-        with open(large, "w", encoding="ascii") as file:
-            file.write(read(stem + ".log") * 200)
+        large = Path(self.folder, "stop-000002-estop_line.log")
+        large.write_text(read(stem + ".log") * 200, encoding="ascii")
         time.sleep(1.2)
         self.assertTrue(self.client.request("reset")["ok"])
         readers = [self.rig.client(f"reader{i}") for i in range(4)]
@@ -375,7 +375,7 @@ class Pieces(WithRig):
         def read_on(i):
             offset = 0
             while time.monotonic() < end:
-                reply = readers[i].request("recording", name=os.path.basename(large), offset=offset)
+                reply = readers[i].request("recording", name=large.name, offset=offset)
                 offset = (offset + 24576) % (reply["size"] + 1) if reply["ok"] else 0
                 got[i] += reply["ok"]
 
@@ -460,9 +460,7 @@ class Record(WithRig):
 
     def test_interrupted_recording_is_whole(self):
         path = self.rig.path("three.log")
-        child = subprocess.Popen(
-            [find_program(BUILD, "iwheelctl"), "--socket", self.rig.path("gateway.sock"), "record", path], stderr=subprocess.PIPE, text=True
-        )
+        child = ctl.start("--socket", self.rig.path("gateway.sock"), "record", path, stderr=subprocess.PIPE, text=True)
         end = time.monotonic() + 20
         while (not os.path.exists(path) or read(path).count("\n") <= 800) and time.monotonic() < end:
             time.sleep(0.05)
@@ -487,9 +485,7 @@ class Learn(WithRig):
         for command in ("type 9", "role setpoint", "unit left dN", "gear left 4", "gear right 4", "rpm left rotor", "rpm right rotor", "pose reversed"):
             self.rig.sim.ask(command)
         path = self.rig.path("other.log")
-        child = subprocess.Popen(
-            [find_program(BUILD, "iwheelctl"), "--socket", self.rig.path("gateway.sock"), "record", path, "--for", "11s"], stderr=subprocess.DEVNULL
-        )
+        child = ctl.start("--socket", self.rig.path("gateway.sock"), "record", path, "--for", "11s")
         time.sleep(1.5)
         self.assertTrue(self.client.request("arm")["ok"])
         for speed in (400, -400):
@@ -498,9 +494,7 @@ class Learn(WithRig):
                 time.sleep(0.05)
         self.client.request("stop")
         child.wait(20)
-        text = read(path).replace(" T\n", "\n")  # As if another controller had sent them.
-        with open(path, "w", encoding="ascii") as file:
-            file.write(text)
+        Path(path).write_text(read(path).replace(" T\n", "\n"), encoding="ascii")  # As if another controller had sent them.
         code, out, err = self.ctl("learn", path)
         self.assertEqual((0, ""), (code, err))
         for part in (

@@ -6,38 +6,20 @@ import os
 import re
 import shutil
 import subprocess
-import sys
 import tempfile
 import time
 import unittest
+from pathlib import Path
 
 import pytest
 
 ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
-from harness import find_program
+from ctl import environment, program, run
+from operator_at_terminal import Operator
 
 pytestmark = pytest.mark.native("processor time: these start hundreds of programs and hardly wait")
-BUILD = os.environ["IWHEEL_BUILD"]
 # Those that talk with a person.
 WITHOUT_JSON = {"top", "bringup", "help", "web", "export"}
-
-
-def run(*words, program="iwheelctl", path=None, **more):
-    """(exit code, stdout, stderr)"""
-    environment = {key: value for key, value in os.environ.items() if key not in ("IWHEEL_SOCKET", "NO_COLOR")}
-    if path:
-        environment["PATH"] = path
-    done = subprocess.run(
-        [find_program(BUILD, program), *words],
-        capture_output=True,
-        text=True,
-        timeout=30,
-        stdin=subprocess.DEVNULL,
-        env={**environment, "TERM": "dumb"},
-        check=False,
-        **more,
-    )
-    return done.returncode, done.stdout, done.stderr
 
 
 def verbs():
@@ -67,17 +49,8 @@ class Grammar(unittest.TestCase):
             code, _, err = run("--socket", "/nonexistent", *words, "0s")
             self.assertEqual((64, f"iwheelctl: {words[-1]} 0s is out of range; write {bounds}\n"), (code, err))
             for right in ("300ms", "0.3s", "0.005min") + (("2s", "0.001h") if words[0] == "drive" else ()):
-                self.assertNotEqual(
-                    64,
-                    run(
-                        "--socket",
-                        "/nonexistent",
-                        *words,
-                        right,
-                        *(("unix:/nonexistent",) if words[0] == "doctor" else ("--can", "unix:/nonexistent") if words[0] == "record" else ()),
-                    )[0],
-                    (words, right),
-                )
+                more = ("unix:/nonexistent",) if words[0] == "doctor" else ("--can", "unix:/nonexistent") if words[0] == "record" else ()
+                self.assertNotEqual(64, run("--socket", "/nonexistent", *words, right, *more)[0], (words, right))
 
     def test_no_other_option_of_a_verb_has_a_time(self):
         """A new one belongs into the table above."""
@@ -94,29 +67,25 @@ class Grammar(unittest.TestCase):
 
 
 class Web(unittest.TestCase):
-    def test_web_is_the_bridges_own_word_or_says_what_to_install(self):
+    def of_another_program(self, verb, package, program, calls):
+        """The verb says what to install; and when it is there calls the program with these words."""
         with tempfile.TemporaryDirectory() as folder:
-            code, out, err = run("web", path=folder)
+            code, out, err = run(verb, env=environment(PATH=folder))
             self.assertEqual((69, ""), (code, out))
-            self.assertIn("apt-get install ./iwheel-web_*.deb", err)
-            fake = os.path.join(folder, "iwheel-web")
-            with open(fake, "w", encoding="ascii") as file:
-                file.write('#!/bin/sh\necho "called $*"\n')
-            os.chmod(fake, 0o755)
-            self.assertEqual((0, "called --url\n", ""), run("web", path=folder))
+            self.assertIn(f"apt-get install ./{package}_*.deb", err)
+            fake = Path(folder, program)
+            fake.write_text('#!/bin/sh\necho "called $*"\n', encoding="ascii")
+            fake.chmod(0o755)
+            for words, passed in calls.items():
+                self.assertEqual((0, f"called {passed}\n", ""), run(verb, *words, env=environment(PATH=folder)))
+
+    def test_web_is_the_bridges_own_word_or_says_what_to_install(self):
+        self.of_another_program("web", "iwheel-web", "iwheel-web", {(): "--url"})
         self.assertEqual(64, run("web", "word")[0])
 
     def test_fleet_is_the_consoles_own_word_or_says_what_to_install(self):
-        with tempfile.TemporaryDirectory() as folder:
-            code, out, err = run("fleet", path=folder)
-            self.assertEqual((69, ""), (code, out))
-            self.assertIn("apt-get install ./iwheel-mqtt_*.deb", err)
-            fake = os.path.join(folder, "iwheel-fleet")
-            with open(fake, "w", encoding="ascii") as file:
-                file.write('#!/bin/sh\necho "called $*"\n')
-            os.chmod(fake, 0o755)
-            self.assertEqual((0, "called \n", ""), run("fleet", path=folder))
-            self.assertEqual((0, "called history w1 --last 12h --json\n", ""), run("fleet", "history", "w1", "--json", "--last", "12h", path=folder))
+        words = ("history", "w1", "--json", "--last", "12h")
+        self.of_another_program("fleet", "iwheel-mqtt", "iwheel-fleet", {(): "", words: "history w1 --last 12h --json"})
 
 
 class Json(unittest.TestCase):
@@ -174,12 +143,12 @@ class Help(unittest.TestCase):
 
     def test_no_help_is_wider_than_80_columns(self):
         pages = [("iwheelctl", ("help",)), ("iwheel-gateway", ("--help",)), ("iwheel-sim", ("--help",)), *(("iwheelctl", ("help", verb)) for verb in verbs())]
-        for program, words in pages:
-            code, out, _ = run(*words, program=program)
-            self.assertEqual(0, code, (program, words))
+        for name, words in pages:
+            code, out, _ = run(*words, name=name)
+            self.assertEqual(0, code, (name, words))
             self.assertGreater(out.count("\n"), 2)
             for line in out.splitlines():
-                self.assertLessEqual(len(line), 80, (program, words, line))
+                self.assertLessEqual(len(line), 80, (name, words, line))
 
     def test_options_of_each_page_are_in_its_usage_and_accepted(self):
         for verb in verbs():
@@ -199,7 +168,7 @@ class Completion(unittest.TestCase):
     """Each shell offers exactly the words that the program lists; the test requests them as the shell does."""
 
     def environment(self):
-        folders = [os.path.dirname(os.path.abspath(find_program(BUILD, name))) for name in ("iwheelctl", "iwheel-gateway", "iwheel-sim")]
+        folders = [os.path.dirname(os.path.abspath(program(name))) for name in ("iwheelctl", "iwheel-gateway", "iwheel-sim")]
         return {**os.environ, "PATH": ":".join([*folders, os.environ["PATH"]])}
 
     def ask(self, *command):
@@ -222,9 +191,6 @@ class Completion(unittest.TestCase):
 
     def zsh(self, *words):
         """Types the words and two tabs on a terminal; returns the text on it."""
-        sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-        from operator_at_terminal import Operator
-
         operator = Operator(["zsh", "-f", "-i"], {**self.environment(), "TERM": "dumb", "PS1": "", "PROMPT": ""}, 200, 50)
         self.addCleanup(operator.close)
         with tempfile.TemporaryDirectory() as folder:

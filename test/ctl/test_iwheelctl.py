@@ -13,76 +13,69 @@ import tempfile
 import time
 import unittest
 
+from ctl import environment, program, run
 from fake_gateway import FakeGateway, snapshot, wheel
+from trials import until
 
-PROGRAM = os.path.join(os.environ["IWHEEL_BUILD"], "app", "ctl", "iwheelctl")
+PROGRAM = program()
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-
-
-def clean_environment(**more):
-    environment = {key: value for key, value in os.environ.items() if key not in ("IWHEEL_SOCKET", "NO_COLOR")}
-    environment.update(more)
-    return environment
-
-
-def run(*words, **more):
-    """(exit code, stdout, stderr, seconds)"""
-    begin = time.monotonic()
-    done = subprocess.run([PROGRAM, *words], capture_output=True, text=True, timeout=30, env=clean_environment(**more.pop("env", {})), **more, check=False)
-    return done.returncode, done.stdout, done.stderr, time.monotonic() - begin
+NOT_ACKNOWLEDGED = {"ok": True, "number": 1, "cause": "send_stalled", "sentence": "setpoint not acknowledged", "at_us": 1}
+PUSHED = {"ok": False, "error": "not_at_rest", "message": "the wheels turn"}
 
 
 def start(*words, **more):
-    return subprocess.Popen([PROGRAM, *words], stdout=more.pop("stdout", subprocess.PIPE), stderr=subprocess.PIPE, text=True, env=clean_environment(), **more)
+    return subprocess.Popen([PROGRAM, *words], stdout=more.pop("stdout", subprocess.PIPE), stderr=subprocess.PIPE, text=True, env=environment(), **more)
 
 
-def wait_until(condition, seconds=5.0):
-    end = time.monotonic() + seconds
-    while not condition():
-        if time.monotonic() > end:
-            raise AssertionError("did not happen in time")
-        time.sleep(0.005)
+def end(process, number=signal.SIGTERM):
+    """(stdout, stderr) of the program that this signal ends."""
+    process.send_signal(number)
+    return process.communicate(timeout=10)
 
 
 class WithGateway(unittest.TestCase):
-    gateway_class = FakeGateway
-
     def setUp(self):
-        self.gateway = self.serve(FakeGateway)
+        self.gateway = self.serve()
 
-    def serve(self, kind):
+    def serve(self, kind=FakeGateway, **replies):
+        """A gateway that replies so to these commands; None: not at all."""
         gateway = kind()
+        for cmd, reply in replies.items():
+            setattr(gateway, f"on_{cmd}", lambda *_, reply=reply: reply)
         self.addCleanup(gateway.close)
         return gateway
 
-    def ctl(self, *words, gateway=None, **more):
-        return run("--socket", (gateway or self.gateway).path, *words, **more)
+    def ctl(self, *words, gateway=None, path=None, **more):
+        """(exit code, stdout, stderr, seconds)"""
+        begin = time.monotonic()
+        return *run("--socket", path or (gateway or self.gateway).path, *words, **more), time.monotonic() - begin
+
+    def fails(self, code, part, *words, **more):
+        """Checks the exit code and a part of the message; returns the seconds."""
+        got, _, err, seconds = self.ctl(*words, **more)
+        self.assertEqual(code, got, err)
+        self.assertIn(part, err)
+        return seconds
 
 
 class Connecting(WithGateway):
     def test_missing_socket_asks_whether_the_gateway_runs(self):
-        code, _, err, _ = run("--socket", "/nonexistent/x.sock", "status")
-        self.assertEqual(69, code)
-        self.assertIn("/nonexistent/x.sock does not exist; is the gateway running?", err)
+        self.fails(69, "/nonexistent/x.sock does not exist; is the gateway running?", "status", path="/nonexistent/x.sock")
 
     def test_stale_socket_is_unavailable(self):
         with tempfile.TemporaryDirectory() as folder:
             path = os.path.join(folder, "s")
             with socket.socket(socket.AF_UNIX) as stale:
                 stale.bind(path)
-            code, _, err, _ = run("--socket", path, "status")
-        self.assertEqual(69, code)
-        self.assertIn("no gateway answers", err)
+            self.fails(69, "no gateway answers", "status", path=path)
 
     def test_path_too_long_is_usage(self):
-        code, _, err, _ = run("--socket", "/" + "a" * 107, "status")
-        self.assertEqual(64, code)
-        self.assertIn("too long", err)
+        self.fails(64, "too long", "status", path="/" + "a" * 107)
 
     def test_environment_names_the_socket_and_the_option_wins(self):
-        self.assertEqual(0, run("status", env={"IWHEEL_SOCKET": self.gateway.path})[0])
-        self.assertEqual(0, self.ctl("status", env={"IWHEEL_SOCKET": "/nonexistent"})[0])
-        self.assertEqual(69, run("status", env={"IWHEEL_SOCKET": "/nonexistent"})[0])
+        self.assertEqual(0, run("status", env=environment(IWHEEL_SOCKET=self.gateway.path))[0])
+        self.assertEqual(0, self.ctl("status", env=environment(IWHEEL_SOCKET="/nonexistent"))[0])
+        self.assertEqual(69, run("status", env=environment(IWHEEL_SOCKET="/nonexistent"))[0])
 
     @unittest.skipUnless(os.geteuid() == 0, "needs root to become another user")
     def test_permission_names_the_group_and_the_command(self):
@@ -109,9 +102,7 @@ class Connecting(WithGateway):
             def greet(self, connection):
                 time.sleep(4)
 
-        code, _, err, seconds = self.ctl("status", gateway=self.serve(NoReply))
-        self.assertEqual(75, code)
-        self.assertIn("no answer within 2 s", err)
+        seconds = self.fails(75, "no answer within 2 s", "status", gateway=self.serve(NoReply))
         self.assertTrue(1.9 < seconds < 3.5, seconds)
 
     def test_full_queue_of_callers_times_out(self):
@@ -129,11 +120,9 @@ class Connecting(WithGateway):
                         caller.connect(path)
                 except BlockingIOError:
                     pass
-                code, _, err, seconds = run("--socket", path, "status")
+                seconds = self.fails(75, "accepts no connection", "status", path=path)
                 for caller in callers:
                     caller.close()
-        self.assertEqual(75, code)
-        self.assertIn("accepts no connection", err)
         self.assertTrue(1.9 < seconds < 3.5, seconds)
 
     def test_connection_closed_immediately_is_unavailable(self):
@@ -141,18 +130,14 @@ class Connecting(WithGateway):
             def greet(self, connection):
                 connection.close()
 
-        code, _, err, _ = self.ctl("status", gateway=self.serve(Rude))
-        self.assertEqual(69, code)
-        self.assertIn("ended the connection", err)
+        self.fails(69, "ended the connection", "status", gateway=self.serve(Rude))
 
     def test_connection_refused_prints_the_reason(self):
         class Full(FakeGateway):
             def greet(self, connection):
                 self.say(connection, {"id": None, "ok": False, "error": "too_many_clients", "message": "16 of 16; close one"})
 
-        code, _, err, _ = self.ctl("status", gateway=self.serve(Full))
-        self.assertEqual(1, code)
-        self.assertIn("refused (too_many_clients): 16 of 16; close one", err)
+        self.fails(1, "refused (too_many_clients): 16 of 16; close one", "status", gateway=self.serve(Full))
 
     def test_another_service_on_the_socket_is_reported(self):
         for first in (b"ok iwheel-sim\n", b"[1,2]\n", b'{"event":"hi"}\n', b'{"event":"hello","event":"hello"}\n', b"x" * 70000, b"\0\n"):
@@ -161,9 +146,7 @@ class Connecting(WithGateway):
                 def greet(self, connection, first=first):
                     connection.sendall(first)
 
-            code, _, err, _ = self.ctl("status", gateway=self.serve(Other))
-            self.assertEqual(70, code, first[:20])
-            self.assertIn("does not use the gateway's protocol", err)
+            self.fails(70, "does not use the gateway's protocol", "status", gateway=self.serve(Other))
 
     def test_reply_in_single_bytes_between_events_is_understood(self):
         class Slow(FakeGateway):
@@ -179,25 +162,15 @@ class Connecting(WithGateway):
         self.assertTrue(out.startswith("it stopped\n"), out)
 
     def test_no_reply_times_out_in_two_seconds(self):
-        class Mute(FakeGateway):
-            def on_reset(self, connection, request):
-                return None
-
-        code, _, err, seconds = self.ctl("reset", gateway=self.serve(Mute))
+        code, _, err, seconds = self.ctl("reset", gateway=self.serve(reset=None))
         self.assertEqual(75, code)
         self.assertTrue(1.9 < seconds < 3.5, (seconds, err))
 
 
 class Showing(WithGateway):
     def show(self, values, why=None, **more):
-        class Fixed(FakeGateway):
-            def on_status(self, _connection, _request):
-                return {"ok": True, **values}
-
-            def on_why(self, connection, request):
-                return why or super().on_why(connection, request)
-
-        code, out, err, _ = self.ctl("status", gateway=self.serve(Fixed), **more)
+        gateway = self.serve(status={"ok": True, **values}, **({"why": why} if why else {}))
+        code, out, err, _ = self.ctl("status", gateway=gateway, **more)
         self.assertEqual(0, code, err)
         for line in out.splitlines():
             self.assertLessEqual(len(line), 80, line)
@@ -246,7 +219,7 @@ class Showing(WithGateway):
                 }
 
             def on_why(self, _connection, _request):
-                return {"ok": True, "number": 1, "cause": "send_stalled", "sentence": "setpoint not acknowledged", "at_us": 1}
+                return NOT_ACKNOWLEDGED
 
         gateway = self.serve(Stalled)
         doctor = ("doctor", "--no-press", "--listen", "200ms")
@@ -264,11 +237,7 @@ class Showing(WithGateway):
                 self.assertEqual(not (online and bus == "can7"), "check the wheels' power and the cable" in text, (what, text))
 
     def test_why_of_setpoint_acknowledged_since_names_no_fix(self):
-        class Cleared(FakeGateway):
-            def on_why(self, _connection, _request):
-                return {"ok": True, "number": 1, "cause": "send_stalled", "sentence": "setpoint not acknowledged", "at_us": 1}
-
-        self.assertNotIn("still", self.ctl("why", gateway=self.serve(Cleared))[1])
+        self.assertNotIn("still", self.ctl("why", gateway=self.serve(why=NOT_ACKNOWLEDGED))[1])
 
     def test_contradiction_shows_observation_cost_and_next_step(self):
         entry = {
@@ -360,8 +329,7 @@ class Showing(WithGateway):
         self.assert_plain(line)
         event = json.loads(line)
         self.assertEqual((event["name"], event["filler"]), (self.MOVING, "x" * 5000 + self.MOVING))
-        process.send_signal(signal.SIGINT)
-        process.communicate(timeout=10)
+        end(process, signal.SIGINT)
 
     def test_latched_names_cause_sentence_and_fix(self):
         out = self.show(
@@ -406,7 +374,7 @@ class Showing(WithGateway):
         for term, no_color, wanted in (("xterm", None, True), ("dumb", None, False), ("xterm", "1", False)):
             parent, child = pty.openpty()
             more = {"TERM": term, **({"NO_COLOR": no_color} if no_color else {})}
-            done = subprocess.run([PROGRAM, "--socket", self.gateway.path, "status"], stdout=child, env=clean_environment(**more), check=False)
+            done = subprocess.run([PROGRAM, "--socket", self.gateway.path, "status"], stdout=child, env=environment(**more), check=False)
             os.close(child)
             shown = b""
             try:
@@ -419,18 +387,13 @@ class Showing(WithGateway):
             self.assertEqual(wanted, b"\033[" in shown, (term, no_color))
 
     def test_why_with_an_empty_sentence_is_no_stop(self):
-        class Empty(FakeGateway):
-            def on_why(self, _connection, _request):
-                return {"ok": True, "number": 0, "sentence": ""}
-
-        self.assertEqual("no stop since the gateway's start\n", self.ctl("why", gateway=self.serve(Empty))[1])
+        gateway = self.serve(why={"ok": True, "number": 0, "sentence": ""})
+        self.assertEqual("no stop since the gateway's start\n", self.ctl("why", gateway=gateway)[1])
 
     def test_why_of_board_without_wall_clock_prints_only_the_age(self):
         stop = {"ok": True, "number": 1, "sentence": "somebody said stop", "latched": False, "age_ms": 553}
         for wall_us, wanted in ((None, r"\n0\.553 s ago; it did not latch\n"), (10**15, r"\nat 2001-09-0.*, 0\.553 s ago; it did not latch\n")):
-            gateway = FakeGateway()
-            self.addCleanup(gateway.close)
-            gateway.on_why = lambda *_, wall_us=wall_us: {**stop, "wall_us": wall_us}
+            gateway = self.serve(why={**stop, "wall_us": wall_us})
             self.assertRegex(self.ctl("why", gateway=gateway)[1], wanted)
 
     def test_why_without_a_stop_says_so(self):
@@ -448,7 +411,7 @@ class Asking(WithGateway):
         for words in (["status"], ["why"], ["status", "--json"]):
             self.ctl(*words)
         watch = start("--socket", self.gateway.path, "watch")
-        wait_until(lambda: self.gateway.count("watch"))
+        until(lambda: self.gateway.count("watch"))
         watch.send_signal(signal.SIGINT)
         self.assertEqual(0, watch.wait(5))
         watch.communicate()
@@ -497,7 +460,7 @@ class Asking(WithGateway):
             def greet(self, connection):
                 time.sleep(3)
 
-        other, hung = self.serve(FakeGateway), self.serve(Hung)
+        other, hung = self.serve(), self.serve(Hung)
         folder = tempfile.TemporaryDirectory(dir=os.path.dirname(self.gateway.folder.name))
         self.addCleanup(folder.cleanup)
         os.link(self.gateway.path, os.path.join(folder.name, "can0.sock"))
@@ -508,7 +471,7 @@ class Asking(WithGateway):
             """In a name space in which the folder is that of the gateways' sockets."""
             mount = 'cd "$0" && mount -t tmpfs none /run && mkdir /run/iwheel && mount -c --bind . /run/iwheel && exec "$@"'
             command = ["unshare", "--mount", "sh", "-c", mount, folder.name, PROGRAM, *words]
-            done = subprocess.run(command, capture_output=True, text=True, timeout=30, env=clean_environment(), check=False)
+            done = subprocess.run(command, capture_output=True, text=True, timeout=30, env=environment(), check=False)
             return done.returncode, done.stdout, done.stderr
 
         if subprocess.run(["unshare", "--mount", "mount", "-t", "tmpfs", "none", "/run"], capture_output=True, check=False).returncode != 0:
@@ -663,7 +626,7 @@ class Asking(WithGateway):
 
     def test_help_of_every_verb_needs_no_gateway(self):
         for verb in ("status", "watch", "drive", "stop", "disarm", "estop", "reset", "release", "tare", "why", "ledger", "confirm", "doctor", "bringup", "top"):
-            code, out, _, _ = run(verb, "--help")
+            code, out, _ = run(verb, "--help")
             self.assertEqual(0, code)
             self.assertTrue(out.startswith("Usage: iwheelctl "), verb)
         self.assertEqual(0, run("--help")[0])
@@ -697,9 +660,8 @@ class Driving(WithGateway):
                 return {"ok": False, "error": "stale_command", "message": "lost on the line"} if lost else done
 
         for last, wanted in ((10**6, 0), (20, 75)):
-            gateway = Lossy()
+            gateway = self.serve(Lossy)
             gateway.last = last
-            self.addCleanup(gateway.close)
             code, _, err, _ = self.drive("200", "200", "--for", "2s", gateway=gateway)
             self.assertEqual(wanted, code, err)
             self.assertEqual(wanted == 75, "did not answer a drive command for 1 s" in err, err)
@@ -715,7 +677,7 @@ class Driving(WithGateway):
         times = self.gateway.times("drive")
         self.assertTrue(0.97 < self.gateway.times("stop")[0] - times[0] < 1.1)
         # The next drive must not be refused as stale because of this one.
-        wait_until(lambda: self.gateway.closed_at is not None)
+        until(lambda: self.gateway.closed_at is not None)
         self.assertGreater(self.gateway.closed_at - times[-1], 0.5)
         arm = next(request for _, request in self.gateway.requests if request["cmd"] == "arm")
         self.assertEqual({"cmd": "arm", "name": "iwheelctl", "id": arm["id"]}, arm)
@@ -742,14 +704,8 @@ class Driving(WithGateway):
         self.assertEqual((-5, 6), (first["left_mA"], first["right_mA"]))
 
     def test_refused_arm_drives_nothing(self):
-        class Busy(FakeGateway):
-            def on_arm(self, _connection, _request):
-                return {"ok": False, "error": "busy", "message": '"joystick" drives'}
-
-        gateway = self.serve(Busy)
-        code, _, err, _ = self.drive("1", "2", gateway=gateway)
-        self.assertEqual(1, code)
-        self.assertIn('refused (busy): "joystick" drives', err)
+        gateway = self.serve(arm={"ok": False, "error": "busy", "message": '"joystick" drives'})
+        self.fails(1, 'refused (busy): "joystick" drives', "drive", "1", "2", gateway=gateway)
         self.assertEqual(0, gateway.count("drive"))
 
     def test_arm_refused_before_standstill_is_requested_again(self):
@@ -767,13 +723,9 @@ class Driving(WithGateway):
         self.assertGreater(gateway.times("drive")[0], gateway.times("arm")[-1])
 
     def test_wheels_that_go_on_turning_are_awaited_for_one_second(self):
-        class Pushed(FakeGateway):
-            def on_arm(self, _connection, _request):
-                return {"ok": False, "error": "not_at_rest", "message": "the wheels turn"}
-
         for words in ([], ["--json"]):
-            gateway = self.serve(Pushed)
-            code, out, err, _ = run("--socket", gateway.path, *words, "drive", "200", "200")
+            gateway = self.serve(arm=PUSHED)
+            code, out, err, _ = self.ctl(*words, "drive", "200", "200", gateway=gateway)
             times = gateway.times("arm")
             self.assertEqual((1, 0), (code, gateway.count("drive")))
             self.assertEqual(1, err.count("waiting for one second"))
@@ -782,26 +734,20 @@ class Driving(WithGateway):
             self.assertTrue(2 < len(times) <= 22, len(times))
 
     def test_signal_while_the_wheels_are_waited_for_ends_it(self):
-        class Pushed(FakeGateway):
-            def on_arm(self, _connection, _request):
-                return {"ok": False, "error": "not_at_rest", "message": "the wheels turn"}
-
-        gateway = self.serve(Pushed)
+        gateway = self.serve(arm=PUSHED)
         process = start("--socket", gateway.path, "drive", "200", "200")
-        wait_until(lambda: gateway.count("arm") > 1)
-        process.send_signal(signal.SIGINT)
-        _, err = process.communicate(timeout=10)
+        until(lambda: gateway.count("arm") > 1)
+        _, err = end(process, signal.SIGINT)
         self.assertEqual((1, 0), (process.returncode, gateway.count("drive")))
         self.assertIn("interrupted", err)
 
     def test_every_signal_stops_immediately_and_waits(self):
         for number in SIGNALS:
-            gateway = self.serve(FakeGateway)
+            gateway = self.serve()
             process = start("--socket", gateway.path, "drive", "200", "200", "--for", "60s")
-            wait_until(lambda g=gateway: g.count("drive") > 5)
+            until(lambda g=gateway: g.count("drive") > 5)
             sent = time.monotonic()
-            process.send_signal(number)
-            _, err = process.communicate(timeout=10)
+            _, err = end(process, number)
             self.assertEqual(1, process.returncode, number)
             self.assertIn("interrupted after", err)
             self.assertLess(gateway.times("stop")[0] - sent, 0.1)
@@ -810,15 +756,10 @@ class Driving(WithGateway):
             self.assertGreater(gateway.times("status")[-1] - gateway.times("stop")[0], 0.2)
 
     def test_signal_before_the_first_answer_counts_no_time(self):
-        class NoAnswer(FakeGateway):
-            def on_drive(self, _connection, _request):
-                return None
-
-        gateway = self.serve(NoAnswer)
+        gateway = self.serve(drive=None)
         process = start("--socket", gateway.path, "drive", "200", "200")
-        wait_until(lambda: gateway.count("drive") > 2)
-        process.send_signal(signal.SIGINT)
-        _, err = process.communicate(timeout=10)
+        until(lambda: gateway.count("drive") > 2)
+        _, err = end(process, signal.SIGINT)
         self.assertIn("interrupted after 0.0 s of 2.0 s", err)
 
     def test_refusal_in_motion_stops_and_never_arms_again(self):
@@ -844,9 +785,7 @@ class Driving(WithGateway):
                 return super().on_drive(connection, request) if self.driving < 5 else None
 
         gateway = self.serve(Deaf)
-        code, _, err, _ = self.drive("200", "200", "--for", "10s", gateway=gateway)
-        self.assertEqual(75, code)
-        self.assertIn("did not answer a drive command for 1 s", err)
+        self.fails(75, "did not answer a drive command for 1 s", "drive", "200", "200", "--for", "10s", gateway=gateway)
         self.assert_stopped_once(gateway)
         self.assertTrue(0.9 < gateway.times("stop")[0] - gateway.times("drive")[4] < 1.3)
 
@@ -857,14 +796,12 @@ class Driving(WithGateway):
                     connection.shutdown(socket.SHUT_RDWR)
                 return super().on_drive(connection, request)
 
-        code, _, err, seconds = self.drive("200", "200", "--for", "10s", gateway=self.serve(Dying))
-        self.assertEqual(69, code)
-        self.assertIn("watchdog", err)
+        seconds = self.fails(69, "watchdog", "drive", "200", "200", "--for", "10s", gateway=self.serve(Dying))
         self.assertLess(seconds, 2)
 
     def test_stalled_client_sends_no_burst(self):
         process = start("--socket", self.gateway.path, "drive", "200", "200", "--for", "1s")
-        wait_until(lambda: self.gateway.count("drive") > 5)
+        until(lambda: self.gateway.count("drive") > 5)
         process.send_signal(signal.SIGSTOP)
         time.sleep(0.4)
         process.send_signal(signal.SIGCONT)
@@ -935,8 +872,7 @@ class Watching(WithGateway):
             gateway = self.serve(self.Talkative)
             process = start("--socket", gateway.path, "watch", "state", "stop", "--rate", "50")
             lines = [json.loads(process.stdout.readline()) for _ in range(100)]
-            process.send_signal(number)
-            process.communicate(timeout=10)
+            end(process, number)
             self.assertEqual(0, process.returncode)
             self.assertEqual(list(range(100)), [line["number"] for line in lines])
             request = gateway.requests[0][1]
@@ -944,9 +880,8 @@ class Watching(WithGateway):
 
     def test_without_words_the_usual_topics(self):
         process = start("--socket", self.gateway.path, "watch")
-        wait_until(lambda: self.gateway.count("watch"))
-        process.terminate()
-        process.communicate(timeout=10)
+        until(lambda: self.gateway.count("watch"))
+        end(process)
         self.assertEqual(["state", "bus", "estop", "lease", "stop"], self.gateway.requests[0][1]["topics"])
 
     def test_reader_that_leaves_ends_it_with_0(self):
@@ -959,7 +894,7 @@ class Watching(WithGateway):
 
     def test_reader_that_leaves_is_noticed_without_events(self):
         process = start("--socket", self.gateway.path, "watch")
-        wait_until(lambda: self.gateway.count("watch"))
+        until(lambda: self.gateway.count("watch"))
         process.stdout.close()
         self.assertEqual(0, process.wait(5))
         process.stderr.close()
@@ -988,13 +923,12 @@ class Watching(WithGateway):
 
         gateway = self.serve(Flood)
         process = start("--socket", gateway.path, "watch")
-        wait_until(lambda: gateway.done, 60)  # The output of iwheelctl is not read, but iwheelctl still receives all events.
+        until(lambda: gateway.done, 60)  # The output of iwheelctl is not read, but iwheelctl still receives all events.
         time.sleep(0.2)
         lines = []
         while not lines or lines[-1].get("number") != Flood.total - 1:
             lines.append(json.loads(process.stdout.readline()))
-        process.terminate()
-        process.communicate(timeout=10)
+        end(process)
         states = [line["number"] for line in lines if line["event"] == "state"]
         lost = sum(line["count"] for line in lines if line["event"] == "lost")
         self.assertLess(len(states), Flood.total / 10)  # The contents of the pipe, and then the last one.

@@ -10,19 +10,28 @@ import struct
 import subprocess
 import tempfile
 import unittest
+from pathlib import Path
 
+import ctl
 import pytest
 
 pytestmark = pytest.mark.exact
-PROGRAM = os.path.join(os.environ["IWHEEL_BUILD"], "app", "ctl", "iwheelctl")
 GOLDEN = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "recordings")
+CONFIG = os.path.join(GOLDEN, "..", "..", "share", "gateway.conf")
 SECOND = "(1760000000.{:06d}) can0 {}\n"
 
 
 def run(*words, text="", **more):
     """(exit code, stdout, stderr)"""
-    done = subprocess.run([PROGRAM, *words], input=text, capture_output=True, text=True, timeout=60, env=dict(os.environ, TZ="UTC"), **more, check=False)
-    return done.returncode, done.stdout, done.stderr
+    return ctl.run(*words, input=text, env=ctl.environment(TZ="UTC"), **more)
+
+
+def good(*words, **more):
+    """The output; with success and without a message."""
+    code, out, err = run(*words, **more)
+    if (code, err) != (0, ""):
+        raise AssertionError(f"{words}: {code}, {err}")
+    return out
 
 
 def lines(*frames):
@@ -42,6 +51,14 @@ def drive_log(interface="can0", type_=1, set_clock=lambda n, t: t, count=1500):
 
 def merged(*logs):
     return "".join(sorted("".join(logs).splitlines(keepends=True)))
+
+
+def refused(code, part, *words, **more):
+    """The message, with this exit code and this part of it."""
+    got, _, err = run(*words, **more)
+    if got != code or part not in err:
+        raise AssertionError(f"{words}: {got}, {err}")
+    return err
 
 
 class Clock(unittest.TestCase):
@@ -71,14 +88,12 @@ class Clock(unittest.TestCase):
             self.assertLess(each["longest_us"], 50_000)
         self.assertIn(words, err)
         with tempfile.TemporaryDirectory() as folder:
-            path = os.path.join(folder, "a.log")
+            decided = []
             for name, log in (("a.log", text), ("b.log", drive_log())):
-                with open(os.path.join(folder, name), "w", encoding="utf-8") as file:
-                    file.write(log)
-            config = os.path.join(GOLDEN, "..", "..", "share", "gateway.conf")
-            _, printed, _ = run("replay", path, "--config", config)
-            _, wanted, _ = run("replay", os.path.join(folder, "b.log"), "--config", config)
-            self.assertEqual(*([line.split(None, 1)[-1] for line in said.splitlines()[1:]] for said in (printed, wanted)))
+                path = Path(folder, name)
+                path.write_text(log, encoding="utf-8")
+                decided.append([line.split(None, 1)[-1] for line in run("replay", path, "--config", CONFIG)[1].splitlines()[1:]])
+            self.assertEqual(*decided)
 
     def test_clock_set_while_recording_invents_nothing(self):
         for name, clock in self.CLOCKS.items():
@@ -93,8 +108,7 @@ class Clock(unittest.TestCase):
                 self.judge("".join(rows), "1 single times are wrong, first in line 2801")
 
     def test_pause_of_ten_minutes_stays_a_pause(self):
-        code, out, err = run("--json", "learn", "-", text=drive_log(set_clock=lambda n, t: t + (600_000000 if n >= 700 else 0)))
-        self.assertEqual((code, err), (0, ""))
+        out = good("--json", "learn", "-", text=drive_log(set_clock=lambda n, t: t + (600_000000 if n >= 700 else 0)))
         self.assertGreater(json.loads(out)["setpoints"]["left"]["longest_us"], 590_000_000)
 
 
@@ -105,9 +119,7 @@ class Interfaces(unittest.TestCase):
     THREE = merged(TWO, drive_log("vcan2", 1, count=200))
 
     def types(self, text, *words):
-        code, out, err = run("--json", "learn", "-", *words, text=text)
-        self.assertEqual((code, err), (0, ""))
-        return list(json.loads(out)["setpoints"]["left"]["types"])
+        return list(json.loads(good("--json", "learn", "-", *words, text=text))["setpoints"]["left"]["types"])
 
     def test_learn_of_several_interfaces_is_refused_by_name(self):
         for text in (self.TWO, self.THREE):
@@ -123,24 +135,17 @@ class Interfaces(unittest.TestCase):
         self.assertEqual(self.types(self.THREE, "--interface", "vcan2"), ["1"])
 
     def test_interface_that_is_not_in_it_is_refused(self):
-        code, _, err = run("learn", "-", "--interface", "can9", text=self.TWO)
-        self.assertEqual(code, 65)
-        self.assertIn("it has no frame of interface can9", err)
+        refused(65, "it has no frame of interface can9", "learn", "-", "--interface", "can9", text=self.TWO)
 
     def test_replay_wants_one_interface(self):
         with tempfile.TemporaryDirectory() as folder:
-            path = os.path.join(folder, "two.log")
-            with open(path, "w", encoding="utf-8") as file:
-                file.write(self.TWO)
-            config = os.path.join(GOLDEN, "..", "..", "share", "gateway.conf")
-            code, _, err = run("replay", path, "--config", config)
-            self.assertEqual(code, 65)
-            self.assertIn("choose one: --interface can0", err)
-            self.assertEqual(run("replay", path, "--config", config, "--interface", "can1")[0], 0)
+            path = Path(folder, "two.log")
+            path.write_text(self.TWO, encoding="utf-8")
+            refused(65, "choose one: --interface can0", "replay", path, "--config", CONFIG)
+            self.assertEqual(run("replay", path, "--config", CONFIG, "--interface", "can1")[0], 0)
 
     def test_decode_shows_every_interface(self):
-        code, out, err = run("decode", "--csv", text=self.THREE)
-        self.assertEqual((code, err), (0, ""))
+        out = good("decode", "--csv", text=self.THREE)
         self.assertEqual({row["interface"] for row in csv.DictReader(io.StringIO(out))}, {"can0", "can1", "vcan2"})
 
 
@@ -156,9 +161,8 @@ class Forms(unittest.TestCase):
         self.folder = folder.name
 
     def file(self, name, data):
-        path = os.path.join(self.folder, name)
-        with open(path, "wb") as file:
-            file.write(data if isinstance(data, bytes) else data.encode())
+        path = Path(self.folder, name)
+        path.write_bytes(data if isinstance(data, bytes) else data.encode())
         return path
 
     def refused(self, path, *words):
@@ -202,9 +206,7 @@ class Forms(unittest.TestCase):
             ("comment", "# a, b [1]\n" + self.LOG),
         ):
             with self.subTest(name):
-                code, out, err = run("decode", self.file("a.log", data))
-                self.assertEqual((code, err), (0, ""))
-                self.assertEqual(out.count("setpoint"), 6)
+                self.assertEqual(good("decode", self.file("a.log", data)).count("setpoint"), 6)
 
     def test_can_utils_forms(self):
         if not shutil.which("log2asc"):
@@ -212,9 +214,7 @@ class Forms(unittest.TestCase):
         asc = subprocess.run(["log2asc", "can0"], input=self.LOG, capture_output=True, text=True, check=True).stdout
         self.refused(self.file("a.asc", asc), "ASC", "asc2log")
         again = subprocess.run(["asc2log"], input=asc, capture_output=True, text=True, check=True).stdout
-        code, out, err = run("decode", self.file("b.log", again))
-        self.assertEqual((code, err), (0, ""))
-        self.assertEqual(out.count("setpoint"), 6)
+        self.assertEqual(good("decode", self.file("b.log", again)).count("setpoint"), 6)
 
     def test_python_can_forms(self):
         try:
@@ -238,9 +238,7 @@ class Forms(unittest.TestCase):
                 if words:
                     self.refused(path, *words)
                 else:
-                    code, out, err = run("decode", path)
-                    self.assertEqual((code, err), (0, ""))
-                    self.assertEqual(out.count("setpoint"), 30)
+                    self.assertEqual(good("decode", path).count("setpoint"), 30)
 
     def test_extended_setpoints_name_the_option_of_python_can(self):
         text = lines("0000010A#01000007D0", "0000012A#01000007D0")
@@ -249,13 +247,11 @@ class Forms(unittest.TestCase):
 
 
 class Decode(unittest.TestCase):
-    def decode(self, text, *words):
-        return run("decode", *words, text=text)
+    def decode(self, text):
+        return run("decode", text=text)
 
     def rows(self, text, *words):
-        code, out, err = self.decode(text, "--csv", *words)
-        self.assertEqual((0, ""), (code, err))
-        return list(csv.DictReader(io.StringIO(out)))
+        return list(csv.DictReader(io.StringIO(good("decode", "--csv", *words, text=text))))
 
     def test_every_message_is_shown_with_units(self):
         code, out, err = self.decode(
@@ -345,9 +341,7 @@ class Decode(unittest.TestCase):
         self.assertIn("1000 of 1000", err)
 
     def test_screen_form_of_candump_is_recognised(self):
-        code, _, err = self.decode(" (1760000000.000000)  can0  10A   [5]  01 01 2C 07 D0\n")
-        self.assertEqual(65, code)
-        self.assertIn("screen form; record with candump -L", err)
+        refused(65, "screen form; record with candump -L", "decode", text=" (1760000000.000000)  can0  10A   [5]  01 01 2C 07 D0\n")
 
     def test_config_determines_the_unit_of_force(self):
         with tempfile.NamedTemporaryFile("w", suffix=".conf") as file:
@@ -379,9 +373,7 @@ class Decode(unittest.TestCase):
             self.assertIn(part, err)
 
     def test_empty_recording_is_reported(self):
-        code, _, err = self.decode("")
-        self.assertEqual(65, code)
-        self.assertIn("it has no frame", err)
+        refused(65, "it has no frame", "decode", text="")
 
     def test_huge_recording_is_streamed_in_constant_memory(self):
         def resident_kB(blocks):
@@ -389,7 +381,7 @@ class Decode(unittest.TestCase):
                 for _ in range(blocks):
                     file.write(block)
                 file.flush()
-                child = subprocess.Popen([PROGRAM, "decode", file.name, "--csv"], stdout=out)
+                child = subprocess.Popen([ctl.program(), "decode", file.name, "--csv"], stdout=out)
                 _, status, usage = os.wait4(child.pid, 0)
                 child.returncode = os.waitstatus_to_exitcode(status)
                 out.seek(0)
@@ -412,8 +404,7 @@ class Decode(unittest.TestCase):
             "100#00",
             "7FF#",
         )
-        code, out, err = run("--json", "decode", text=text)
-        self.assertEqual((0, ""), (code, err))
+        out = good("--json", "decode", text=text)
         objects = [json.loads(line) for line in out.splitlines()]
         rows = self.rows(text)
         self.assertEqual(len(rows), len(objects))
@@ -434,7 +425,7 @@ class Decode(unittest.TestCase):
         self.assertIn("not both", err)
 
     def test_live_input_is_decoded_line_by_line(self):
-        child = subprocess.Popen([PROGRAM, "decode"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        child = subprocess.Popen([ctl.program(), "decode"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         try:
             child.stdin.write(lines("100#000F0001"))
             child.stdin.flush()
@@ -458,15 +449,11 @@ class Replay(unittest.TestCase):
         return run("replay", name, *words, cwd=self.folder)
 
     def change(self, ending, change):
-        path = os.path.join(self.folder, f"estop.{ending}")
-        with open(path, encoding="utf-8") as file:
-            text = change(file.read())
-        with open(path, "w", encoding="utf-8") as file:
-            file.write(text)
+        path = Path(self.folder, f"estop.{ending}")
+        path.write_text(change(path.read_text(encoding="utf-8")), encoding="utf-8")
 
     def test_golden_recording_decides_the_same_bytes_each_time(self):
-        with open(os.path.join(GOLDEN, "estop.replay"), encoding="utf-8") as file:
-            expected = file.read()
+        expected = Path(GOLDEN, "estop.replay").read_text(encoding="utf-8")
         for _ in range(3):
             self.assertEqual((0, expected, ""), self.replay())
         self.assertRegex(expected, r"setpoints on the bus: (\d+) of \1 as recorded")
@@ -508,8 +495,7 @@ class Replay(unittest.TestCase):
         self.assertIn("--config FILE", err)
 
     def test_setpoints_of_another_controller_are_a_second_master(self):
-        with open(os.path.join(self.folder, "other.log"), "w", encoding="utf-8") as file:
-            file.write(lines("100#00000000", "120#00000000", "10A#0101F40064"))
+        Path(self.folder, "other.log").write_text(lines("100#00000000", "120#00000000", "10A#0101F40064"), encoding="utf-8")
         code, out, _ = self.replay("--config", "estop.conf", name="other.log")
         self.assertEqual(0, code)
         self.assertIn("fault      second_master", out)
@@ -542,8 +528,7 @@ class Replay(unittest.TestCase):
                 self.assertIn("# end:", out)
 
     def test_long_silence_is_cut(self):
-        with open(os.path.join(self.folder, "gap.log"), "w", encoding="utf-8") as file:
-            file.write("(1.0) can0 100#00000000\n(601.0) can0 100#00000000\n(600.95) can0 100#00000000\n")
+        Path(self.folder, "gap.log").write_text("(1.0) can0 100#00000000\n(601.0) can0 100#00000000\n(600.95) can0 100#00000000\n", encoding="utf-8")
         code, out, _ = self.replay("--config", "estop.conf", name="gap.log")
         self.assertEqual(0, code)
         self.assertIn("the gap is shortened to 60 s", out)
@@ -563,8 +548,7 @@ class Replay(unittest.TestCase):
 
 class Why(unittest.TestCase):
     def test_recorded_stop_is_printed_without_a_gateway(self):
-        code, out, err = run("why", "estop.jsonl", "--frames", "3", cwd=GOLDEN)
-        self.assertEqual((0, ""), (code, err))
+        out = good("why", "estop.jsonl", "--frames", "3", cwd=GOLDEN)
         shown = out.splitlines()
         self.assertIn("pressed while driving 300/-100 mm/s", shown[0])
         self.assertIn("iwheelctl replay estop.log", shown[2])
@@ -578,10 +562,8 @@ class Why(unittest.TestCase):
             for number, cause in ((2, "estop_line"), (11, "wheel_lost")):
                 for ending in ("log", "jsonl", "conf"):
                     shutil.copy(os.path.join(GOLDEN, f"estop.{ending}"), os.path.join(folder, f"stop-{number:06d}-{cause}.{ending}"))
-            with open(os.path.join(folder, "stop-000012-x.jsonl"), "w", encoding="utf-8") as file:
-                file.write('{"type":"blackbox"}\n')
-            with open(os.path.join(folder, "stop-000013-x.jsonl"), "w", encoding="utf-8") as file:
-                file.write("rubbish")
+            Path(folder, "stop-000012-x.jsonl").write_text('{"type":"blackbox"}\n', encoding="utf-8")
+            Path(folder, "stop-000013-x.jsonl").write_text("rubbish", encoding="utf-8")
             code, out, err = run("why", "--list", "--directory", folder)
             self.assertEqual(0, code)
             self.assertEqual(["2", "11", "12"], [line.split()[0] for line in out.splitlines() if line[:6].strip()][:3])
@@ -590,14 +572,10 @@ class Why(unittest.TestCase):
             code, out, _ = run("why", "11", "--directory", folder)
             self.assertEqual(0, code)
             self.assertIn("stop-000011-wheel_lost.log", out)
-            code, _, err = run("why", "5", "--directory", folder)
-            self.assertEqual(65, code)
-            self.assertIn("why --list", err)
+            refused(65, "why --list", "why", "5", "--directory", folder)
 
     def test_directory_that_is_not_there(self):
-        code, _, err = run("why", "--list", "--directory", "/nonexistent")
-        self.assertEqual(69, code)
-        self.assertIn("--directory DIR", err)
+        refused(69, "--directory DIR", "why", "--list", "--directory", "/nonexistent")
 
 
 class Learn(unittest.TestCase):
@@ -625,9 +603,7 @@ class Learn(unittest.TestCase):
         return "".join(line for _, line in sorted(text, key=lambda item: item[0])).upper().replace("CAN0", "can0")
 
     def learn(self, **how):
-        code, out, err = run("learn", "-", text=self.story(**how))
-        self.assertEqual((0, ""), (code, err))
-        return out
+        return good("learn", "-", text=self.story(**how))
 
     def test_type_ranges_length_period_are_printed_and_suggested(self):
         out = self.learn(types=(7, 7), extra=b"\0\0\0")
