@@ -23,6 +23,7 @@ from pathlib import Path
 
 import pytest
 from bus import now_us
+from certificate import self_signed
 from harness import Process, wait_connect
 from judge_log import GAP_US
 from shifted_clock import ShiftedClock
@@ -39,14 +40,33 @@ def raw(rig, data, seconds=3):
     """The reply to these bytes, until the bridge closes the connection or sends nothing more."""
     with socket.create_connection(("127.0.0.1", rig.port), timeout=seconds) as one:
         answer = b""
-        try:
+        with contextlib.suppress(OSError):
             one.sendall(data)
             one.shutdown(socket.SHUT_WR)
             while piece := one.recv(65536):
                 answer += piece
-        except OSError:
-            pass
         return answer
+
+
+def read_until(stream, holds):
+    """Reads on until its latest text fulfils the condition."""
+    text = b""
+    while not holds(text):
+        piece = stream.recv(65536)
+        assert piece, "the stream has ended"
+        text = text[-200:] + piece
+
+
+def stopped_ms(rig, **options):
+    """Milliseconds from the request for a stop to the first smaller setpoint on the bus."""
+    since = now_us()
+    status, body = rig.ask_json("POST", "/api/stop", **options)
+    assert status == 200 and body["state"] == "stopping", body
+    return braking_ms(rig, since)
+
+
+def assert_refused(answer, status, error):
+    assert answer[0] == status and answer[1]["error"] == error, answer
 
 
 def gateway_state(rig):
@@ -55,6 +75,11 @@ def gateway_state(rig):
         return client.request("status")
     finally:
         client.close()
+
+
+def at_standstill(rig):
+    """By the gateway's own word: the bridge may be busy or without a connection."""
+    until(lambda: gateway_state(rig)["state"] == "listening", what="the wheels are at standstill")
 
 
 # ---- access ---------------------------------------------------------------------------------------------------------
@@ -82,12 +107,9 @@ def test_stop_never_needs_a_proof(rig):
     rig.start().connected()
     for token in ("", "0" * 32):
         driver = Driver(rig)
-        since = now_us()
-        status, body = rig.ask_json("POST", "/api/stop", token=token)
-        assert status == 200 and body["state"] == "stopping", body
-        assert (late := braking_ms(rig, since)) < 200, f"{late} ms"
+        assert (late := stopped_ms(rig, token=token)) < 200, f"{late} ms"
         driver.end()
-        until(lambda: gateway_state(rig)["state"] == "listening", what="the wheels are at standstill")
+        at_standstill(rig)
 
 
 @pytest.mark.rig(driving=True)
@@ -149,11 +171,7 @@ def test_token_over_or_replaced_ends_streams_and_is_refused(rig):
             until(lambda: rig.ask("GET", "/health", token=before)[0] == 401, what="the old token is refused")
             rig.proved = None
             assert rig.token != before
-            text = b""
-            while not text.endswith(b"\r\n0\r\n\r\n"):
-                piece = stream.recv(65536)
-                assert piece, "the stream ends in form"
-                text = text[-20:] + piece
+            read_until(stream, lambda text: text.endswith(b"\r\n0\r\n\r\n"))
         assert rig.ask("GET", "/health")[0] == 200
 
 
@@ -348,10 +366,7 @@ def test_stop_during_1000_connections_arrives_without_a_gap(rig):
         assert int(crowd.search(rig.ask("GET", "/metrics")[1])[1]) > before + 1000, "the flood has ended on its own"
         assert_no_gap(rig, since)
         assert gateway_state(rig)["state"] == "armed", gateway_state(rig)["cause"]
-        pressed = now_us()
-        status, body = rig.ask_json("POST", "/api/stop")
-        assert status == 200 and body["state"] == "stopping", body
-        assert (late := braking_ms(rig, pressed)) < 500, f"{late} ms"
+        assert (late := stopped_ms(rig)) < 500, f"{late} ms"
         assert rig.web.resident_kB() < 60_000, rig.web.resident_kB()
     finally:
         flood.kill()
@@ -422,11 +437,7 @@ def test_64_watchers_are_one_gateway_client_and_all_get_events(rig):
         time.sleep(1)  # The first ones fall behind.
         begun = now_us()
         for stream in streams:
-            text = b""
-            while (found := re.findall(rb'"event":"state","t_us":(\d+)', text)) == [] or int(found[-1]) < begun:
-                piece = stream.recv(65536)
-                assert piece, "a stream ended"
-                text = text[-200:] + piece
+            read_until(stream, lambda text: any(int(t_us) >= begun for t_us in re.findall(rb'"event":"state","t_us":(\d+)', text)))
         assert rig.ask("GET", "/metrics")[1].count("iwheel_web_watchers 64\n") == 1
         assert rig.web.resident_kB() < 80_000, rig.web.resident_kB()
         assert_no_gap(rig, since)
@@ -443,12 +454,9 @@ def test_64_watchers_are_one_gateway_client_and_all_get_events(rig):
 def test_stop_is_on_the_bus_within_a_fifth_of_a_second(rig):
     rig.start().connected()
     driver = Driver(rig)
-    since = now_us()
-    status, body = rig.ask_json("POST", "/api/stop")
-    assert status == 200 and body["state"] == "stopping", body
-    assert (late := braking_ms(rig, since)) < 200, f"{late} ms"
+    assert (late := stopped_ms(rig)) < 200, f"{late} ms"
     driver.end()
-    until(lambda: gateway_state(rig)["state"] == "listening", what="the wheels are at standstill")
+    at_standstill(rig)
     assert rig.ask_json("POST", "/api/estop")[1]["state"] == "latched"
     stops = until(lambda: (found := rig.ask_json("GET", "/api/stops")[1]["stops"]) and len(found) == 2 and found, 8, "both stops are reported")
     assert [stop["cause"] for stop in stops] == ["estop_software", "client_stop"] and len(stops[1]["frames_before"]) == 40
@@ -487,8 +495,7 @@ def test_bridge_before_the_gateway_waits_for_it(rig):
 def test_bridge_that_watches_cannot_drive_arm_or_reset(rig):
     rig.start().connected()
     for path in ("/api/arm", "/api/drive?v_mm_s=100", "/api/reset"):
-        status, body = rig.ask_json("POST", path)
-        assert status == 403 and body["error"] == "denied", body
+        assert_refused(rig.ask_json("POST", path), 403, "denied")
 
 
 @pytest.mark.rig(driving=True)
@@ -509,8 +516,7 @@ def test_page_drives_while_it_asks_and_no_longer(rig):
         (terms["key"], number + 1, -1_000_000, 150),
         (terms["key"], number + 1, 0, 301),
     ):
-        status, body = person.drive(key, sequence, age_us, v)
-        assert status == 409 and body["error"] == "dropped", body
+        assert_refused(person.drive(key, sequence, age_us, v), 409, "dropped")
     since = now_us()
     until(lambda: gateway_state(rig)["state"] in ("stopping", "listening"), 3, "the wheels stop without commands")
     assert braking_ms(rig, since) < 1000
@@ -555,8 +561,7 @@ def test_bridge_killed_while_driving_stops_the_wheels(rig):
 def test_driving_by_the_watch_socket_ends_with_the_missing_right(rig):
     rig.start_gateway()
     rig.web_settings["gateway"]["socket"] = rig.path("watch.sock")
-    web = rig.start_web(wait=False)
-    assert web.wait(5) == 77 and "for watching only" in web.text(), web.text()
+    rig.refuses_to_start(77, "for watching only")
 
 
 # ---- a stop is never refused and never queues -------------------------------------------------------------------------
@@ -582,8 +587,8 @@ threading.Event().wait()
 
 
 @contextlib.contextmanager
-def polling(rig, count, *paths):
-    child = subprocess.Popen([sys.executable, "-c", POLL, str(rig.port), str(count), rig.read_secret, *paths], preexec_fn=lambda: os.nice(5))
+def polling(rig, count, *paths, code=POLL):
+    child = subprocess.Popen([sys.executable, "-c", code, str(rig.port), str(count), rig.read_secret, *paths], preexec_fn=lambda: os.nice(5))
     try:
         time.sleep(1)
         yield
@@ -592,23 +597,14 @@ def polling(rig, count, *paths):
         child.wait()
 
 
-def stop_ms(rig, verb="stop"):
-    """Milliseconds from the request to the first smaller setpoint on the bus, next to a client that drives."""
-    driver = Driver(rig)
-    since = now_us()
-    status, body = rig.ask_json("POST", f"/api/{verb}")
-    assert status == 200, body
-    late = braking_ms(rig, since)
-    driver.end()
-    return late
-
-
 def assert_stops(rig, times=4):
     for _ in range(times):
-        late = stop_ms(rig)
+        driver = Driver(rig)
+        late = stopped_ms(rig)
+        driver.end()
         print(f"        {late:.0f} ms", flush=True)
         assert late < 200, f"{late} ms"
-        until(lambda: gateway_state(rig)["state"] == "listening", what="the wheels are at standstill")
+        at_standstill(rig)
 
 
 def test_stop_reaches_a_gateway_whose_places_are_all_in_use(rig):
@@ -654,16 +650,10 @@ def test_stop_never_needs_a_free_place_of_the_bridge(rig):
 def test_stop_never_waits_for_stops_of_others(rig):
     """90 people press STOP again and again; one presses the second control."""
     rig.start().connected()
-    code = POLL.replace('"GET"', '"POST"')
-    child = subprocess.Popen([sys.executable, "-c", code, str(rig.port), "90", rig.read_secret, "/api/stop"], preexec_fn=lambda: os.nice(5))
-    try:
-        time.sleep(1)
+    with polling(rig, 90, "/api/stop", code=POLL.replace('"GET"', '"POST"')):
         begun = time.monotonic()
         assert rig.ask_json("POST", "/api/estop")[1]["state"] == "latched"
         assert (late := time.monotonic() - begun) < 0.2, f"{late} s"
-    finally:
-        child.kill()
-        child.wait()
 
 
 # ---- one person --------------------------------------------------------------------------------------------------------
@@ -703,7 +693,7 @@ def test_one_person_drives_and_the_second_is_busy_by_name(rig):
     sequence = drive_for(first, key, sequence, 0.1)
     assert gateway_state(rig)["lease"]["name"] == name and gateway_state(rig)["state"] == "armed"
     assert first.ask("POST", "/api/stop")[0] == 200
-    until(lambda: gateway_state(rig)["state"] == "listening", what="the wheels are at standstill")
+    at_standstill(rig)
     time.sleep(0.6)
     status, terms = second.arm()
     assert status == 200 and terms["key"] != key, terms
@@ -871,8 +861,7 @@ def test_start_without_both_loopback_addresses_is_refused(rig):
                     raise Skip("this machine has no IPv6 on loopback") from error
                 raise
             other.listen()
-            web = rig.start_web(wait=False)
-            assert web.wait(5) == 69 and f"cannot listen on {address} port" in web.text(), web.text()
+            rig.refuses_to_start(69, f"cannot listen on {address} port")
     rig.start_web()
     listening = Path("/proc/net/tcp").read_text(encoding="ascii") + Path("/proc/net/tcp6").read_text(encoding="ascii")
     ours = sorted(line.split()[1] for line in listening.splitlines() if f":{rig.port:04X} " in line and line.split()[3] == "0A")
@@ -943,30 +932,7 @@ def test_sockets_of_systemd_that_listen_elsewhere_are_refused(rig):
 
 
 def certificate(rig, name):
-    subprocess.run(
-        [
-            "openssl",
-            "req",
-            "-x509",
-            "-newkey",
-            "ec",
-            "-pkeyopt",
-            "ec_paramgen_curve:prime256v1",
-            "-nodes",
-            "-days",
-            "1",
-            "-subj",
-            "/CN=localhost",
-            "-addext",
-            "subjectAltName=DNS:localhost,IP:127.0.0.1",
-            "-keyout",
-            rig.path(f"{name}.key"),
-            "-out",
-            rig.path(f"{name}.pem"),
-        ],
-        check=True,
-        capture_output=True,
-    )
+    self_signed(rig.folder, name, "localhost", "-addext subjectAltName=DNS:localhost,IP:127.0.0.1")
 
 
 def test_tls_needs_a_trusted_certificate_and_its_key(rig):
@@ -976,8 +942,7 @@ def test_tls_needs_a_trusted_certificate_and_its_key(rig):
     certificate(rig, "other")
     rig.start_gateway()
     rig.web_settings["web"].update(certificate=rig.path("ours.pem"), key=rig.path("other.key"))
-    web = rig.start_web(wait=False)
-    assert web.wait(5) == 78 and "does not fit the key" in web.text(), web.text()
+    rig.refuses_to_start(78, "does not fit the key")
     rig.web_settings["web"].update(key=rig.path("ours.key"))
     rig.start_web(wait=False)
 
@@ -1009,11 +974,10 @@ def test_private_key_that_others_can_read_is_refused(rig):
     rig.web_settings["web"].update(certificate=rig.path("ours.pem"), key=rig.path("ours.key"))
     for mode, code in ((0o644, 77), (0o604, 77), (0o660, 77), (0o640, None)):
         os.chmod(rig.path("ours.key"), mode)
-        web = rig.start_web(wait=False)
         if code is None:
-            until(lambda: "its address with the token" in web.text(), what="it starts")
+            rig.starts_web()
         else:
-            assert web.wait(5) == code and "may be read by others" in web.text(), (oct(mode), web.text())
+            rig.refuses_to_start(code, "may be read by others", oct(mode))
 
 
 def test_check_refuses_a_token_that_the_start_refuses(rig):
@@ -1030,12 +994,12 @@ def test_check_refuses_a_token_that_the_start_refuses(rig):
         token.write_text(text + "\n", encoding="ascii")
         os.chmod(token, mode)
         code, words = check()
-        web = rig.start_web(wait=False)
         if about is None:
             assert code == 0, words
-            until(lambda web=web: "its address with the token" in web.text(), what="it starts")
+            rig.starts_web()
         else:
-            assert code == web.wait(5) == 78 and about in words and about in web.text(), (code, words, web.text())
+            assert code == 78 and about in words, (code, words)
+            rig.refuses_to_start(78, about)
 
 
 def start_lan(rig):
@@ -1066,12 +1030,10 @@ def test_lan_serves_https_with_own_certificate_and_never_drives(rig):
             return json.loads(urllib.request.urlopen(secret, context=trust).read())
 
     assert until(health, what="the gateway's state is known")["may_drive"] is False
-    rig.web.signal(15)
-    assert rig.web.wait(5) == 0
+    rig.end_web()
     start_lan(rig)
     assert files["lan-certificate.pem"].read_bytes() == made, "made once"
-    rig.web.signal(15)
-    rig.web.wait(5)
+    rig.end_web()
     files["lan-certificate.pem"].write_text("no certificate")
     start_lan(rig)
     assert files["lan-certificate.pem"].read_bytes() not in (made, b"no certificate")
@@ -1081,8 +1043,7 @@ def test_tls_is_new_and_authenticated_only(rig):
     certificate(rig, "ours")
     rig.start_gateway()
     rig.web_settings["web"].update(certificate=rig.path("ours.pem"), key=rig.path("ours.key"))
-    web = rig.start_web(wait=False)
-    until(lambda: "its address with the token" in web.text(), what="it starts")
+    rig.starts_web()
 
     def speaks(*options):
         done = subprocess.run(
@@ -1105,14 +1066,12 @@ def test_unix_socket_deletes_no_file_and_no_link(rig):
     rig.web_settings["web"]["listen"] = f"unix:{place}"
     for make in (lambda: place.write_text("mine", encoding="ascii"), lambda: place.symlink_to(target)):
         make()
-        web = rig.start_web(wait=False)
-        assert web.wait(5) == 69 and "cannot listen" in web.text(), web.text()
+        rig.refuses_to_start(69, "cannot listen")
         assert place.read_text(encoding="ascii") == "mine"
         place.unlink()
     with socket.socket(socket.AF_UNIX) as dead:
         dead.bind(str(place))
-    web = rig.start_web(wait=False)
-    until(lambda: "its address with the token" in web.text(), what="a leftover socket is replaced")
+    rig.starts_web()
 
 
 def test_unix_socket_in_place_of_a_port(rig):
@@ -1125,8 +1084,8 @@ def test_unix_socket_in_place_of_a_port(rig):
         one.sendall(f"GET /health HTTP/1.0\r\nHost: localhost\r\nAuthorization: Bearer {rig.read_secret}\r\n\r\n".encode())
         assert re.match(rb"HTTP/1\.[01] (200|503) ", one.recv(100))
     assert oct(os.stat(rig.path("web.sock")).st_mode & 0o777) == "0o660"
-    rig.web.signal(signal.SIGTERM)
-    assert rig.web.wait(3) == 0 and not os.path.exists(rig.path("web.sock"))
+    rig.end_web(3)
+    assert not os.path.exists(rig.path("web.sock"))
 
 
 SAMPLE = re.compile(r'([a-z_:][a-z0-9_:]*)(\{[a-z_]+="[^"]*"\})? (-?\d+(?:\.\d+)?)')
@@ -1282,8 +1241,7 @@ def test_words_of_the_page_are_those_of_iwheelctl(rig):
 def test_fleet_serves_only_the_file_of_iwheel_fleet(rig):
     rig.start()
     assert rig.ask_json("GET", "/api/fleet")[0] == 404 and rig.ask_json("GET", "/health")[1]["fleet"] is False
-    rig.web.signal(15)
-    rig.web.wait(5)
+    rig.end_web()
     source = Path(rig.path("fleet.json"))
     rig.web_settings["fleet"]["source"] = source
     rig.start_web()

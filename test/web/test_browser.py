@@ -62,6 +62,68 @@ def live(page):
     return page
 
 
+@contextlib.contextmanager
+def live_page(rig, *size_and_scheme, **options):
+    """The page when it shows values. Gateway and bridge are started, if that was not done before."""
+    if rig.web is None:
+        rig.start().connected()
+    with page_of(rig, *size_and_scheme, **options) as page:
+        yield live(page)
+
+
+def shot(page, name, at=None, **options):
+    if os.environ.get("IWHEEL_WEB_SHOTS"):
+        if at:
+            page.locator(at).scroll_into_view_if_needed()
+        page.screenshot(path=Path(os.environ["IWHEEL_WEB_SHOTS"]) / f"{name}.png", **options)
+
+
+def assert_accessible(page, axe):
+    """By axe-core, which as a debugger is not bound by the page's policy."""
+    page.context.new_cdp_session(page).send("Runtime.evaluate", {"expression": axe.read_text(encoding="utf-8")})
+    found = page.evaluate("axe.run(document, {resultTypes: ['violations']})")["violations"]
+    assert not found, [(one["id"], [node["target"] for node in one["nodes"]][:4]) for one in found]
+
+
+def download(rig, page, selector, name=None):
+    """Clicks and stores the file, by default with the name that the page suggests."""
+    with page.expect_download() as begun:
+        page.click(selector)
+    path = Path(rig.path(name or begun.value.suggested_filename))
+    begun.value.save_as(path)
+    return path
+
+
+def middle_of(page, selector):
+    box = page.locator(selector).bounding_box()
+    return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+
+def brakes_ms(rig, act):
+    """Milliseconds from this act to the first smaller setpoint on the bus."""
+    since = now_us()
+    act()
+    return braking_ms(rig, since)
+
+
+def latch(rig, page):
+    """By the software e-stop, until the page offers a reset."""
+    rig.ask("POST", "/api/estop")
+    page.wait_for_selector("#reset:visible")
+    seen(page, "page.stop !== null")
+
+
+def record_a_stop(rig):
+    """A machine that was stopped at full speed, with its recording."""
+    rig.start().connected()
+    driver = Driver(rig)
+    until(lambda: (rig.bus.speed_rpm(0) or 0) >= 9, what="180 mm/s are measured")
+    rig.sim.ask("estop press")
+    until(lambda: (found := rig.ask_json("GET", "/api/recordings")[1].get("recordings")) and found[0]["log_bytes"], 8, "a recording")
+    time.sleep(2.5)  # It grows for two seconds.
+    driver.end()
+
+
 # The texts that the page shows for its present snapshot, and that snapshot.
 READ = """() => { show(); const read = {}; for (const e of document.querySelectorAll('[id]')) read[e.id] = e.textContent; return [page.state, read]; }"""
 
@@ -118,9 +180,7 @@ def compare(state, read):
 
 
 def test_every_element_shows_the_snapshot_of_the_same_moment(rig):
-    rig.start().connected()
-    with page_of(rig) as page:
-        live(page)
+    with live_page(rig) as page:
         assert "token" not in page.url, "the token stays in the address"
         compare(*page.evaluate(READ))
         driver = Driver(rig)
@@ -140,11 +200,8 @@ def test_every_element_shows_the_snapshot_of_the_same_moment(rig):
 
 
 def test_stop_button_is_on_the_bus_within_a_fifth_of_a_second(rig):
-    rig.start().connected()
-    with page_of(rig, "phone") as page:
-        live(page)
-        box = page.locator("#stop").bounding_box()
-        page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    with live_page(rig, "phone") as page:
+        page.mouse.move(*middle_of(page, "#stop"))
         for press in (page.mouse.down, lambda: page.keyboard.press("s")):  # The finger stays where it is.
             driver = Driver(rig)
             page.evaluate(
@@ -161,13 +218,11 @@ def test_stop_button_is_on_the_bus_within_a_fifth_of_a_second(rig):
             assert late_ms < 200, f"{late_ms} ms"
             seen(page, "document.querySelector('#delivered').textContent.startsWith('Stop delivered')")
             driver.end()
-            until(lambda: rig.ask_json("GET", "/api/status")[1]["state"] == "listening", what="the wheels are at standstill")
+            rig.at_standstill()
 
 
 def test_estop_is_asked_for_once_more_and_cancelled_by_escape(rig):
-    rig.start().connected()
-    with page_of(rig) as page:
-        live(page)
+    with live_page(rig) as page:
         page.click("#estop-ask")
         page.keyboard.press("Escape")
         time.sleep(0.3)
@@ -180,9 +235,7 @@ def test_estop_is_asked_for_once_more_and_cancelled_by_escape(rig):
 
 
 def test_gateway_killed_values_unknown_and_stop_not_delivered(rig):
-    rig.start().connected()
-    with page_of(rig, "phone") as page:
-        live(page)
+    with live_page(rig, "phone") as page:
         rig.kill_gateway(signal.SIGKILL)
         seen(page, "document.querySelector('#news').className === 'bad'")
         read = page.evaluate(READ)[1]
@@ -198,9 +251,7 @@ def test_gateway_killed_values_unknown_and_stop_not_delivered(rig):
 
 
 def test_bridge_killed_and_back_the_page_says_so_and_goes_on(rig):
-    rig.start().connected()
-    with page_of(rig) as page:
-        live(page)
+    with live_page(rig) as page:
         rig.web.signal(signal.SIGKILL)
         seen(page, "document.querySelector('#news').textContent.startsWith('No connection')")
         page.click("#stop")
@@ -242,22 +293,16 @@ HIDE = "Object.defineProperty(document, 'hidden', {value: true, configurable: tr
 
 @pytest.mark.rig(driving=True)
 def test_pad_drives_while_held_and_stops_when_released_or_hidden(rig):
-    rig.start().connected()
-    with page_of(rig) as page:
-        live(page)
+    with live_page(rig) as page:
         hold(page)
         turns(rig)
-        since = now_us()
-        page.mouse.up()
-        assert braking_ms(rig, since) < 500
-        until(lambda: rig.ask_json("GET", "/api/status")[1]["state"] == "listening", what="the wheels are at standstill")
+        assert brakes_ms(rig, page.mouse.up) < 500
+        rig.at_standstill()
         for end in (BLUR, PINCH, HIDE):
             page.mouse.down()
             turns(rig)
-            since = now_us()
-            page.evaluate(end)
-            assert braking_ms(rig, since) < 500, end
-            until(lambda: rig.ask_json("GET", "/api/status")[1]["state"] == "listening", what="the wheels are at standstill")
+            assert brakes_ms(rig, lambda: page.evaluate(end)) < 500, end
+            rig.at_standstill()
             page.mouse.up()
             time.sleep(0.6)  # The time without commands that `arm` needs.
         assert until(lambda: rig.ask_json("GET", "/api/stops")[1]["stops"], what="a stop")[0]["cause"] == "client_stop"
@@ -265,17 +310,13 @@ def test_pad_drives_while_held_and_stops_when_released_or_hidden(rig):
 
 @pytest.mark.rig(driving=True)
 def test_pad_held_by_a_key_stops_with_the_focus(rig):
-    rig.start().connected()
-    with page_of(rig) as page:
-        live(page)
+    with live_page(rig) as page:
         page.click("#arm")
         page.click("#ask-yes")
         page.focus("#pad")
         page.keyboard.down("ArrowUp")
         turns(rig)
-        since = now_us()
-        page.focus("#freeze")
-        assert braking_ms(rig, since) < 500
+        assert brakes_ms(rig, lambda: page.focus("#freeze")) < 500
 
 
 def move_by_key(page, n):
@@ -289,9 +330,7 @@ def move_by_mouse(page, n):
 
 @pytest.mark.rig(driving=True)
 def test_pad_held_without_evidence_of_a_hand_stops_after_2_s(rig):
-    rig.start().connected()
-    with page_of(rig) as page:
-        live(page)
+    with live_page(rig) as page:
         page.click("#arm")
         page.click("#ask-yes")
         page.focus("#pad")
@@ -309,7 +348,7 @@ def test_pad_held_without_evidence_of_a_hand_stops_after_2_s(rig):
             braked_ms = 500 + braking_ms(rig, last + 500_000, 3)
             assert 1700 < braked_ms < 2500, f"{braked_ms} ms"
             seen(page, "document.querySelector('#pad-says').textContent.includes('hold the pad again')")
-            until(lambda: rig.ask_json("GET", "/api/status")[1]["state"] == "listening", what="the wheels are at standstill")
+            rig.at_standstill()
             move(page, 1)
             time.sleep(0.5)
             assert rig.ask_json("GET", "/api/status")[1]["state"] == "listening", "it began without a new press"
@@ -353,37 +392,18 @@ def compare_mcap(path, table, log):
 
 
 def test_recording_is_opened_played_and_reopened_from_files(rig):
-    rig.start().connected()
-    driver = Driver(rig)
-    until(lambda: (rig.bus.speed_rpm(0) or 0) >= 9, what="180 mm/s are measured")
-    rig.sim.ask("estop press")
-    until(lambda: (found := rig.ask_json("GET", "/api/recordings")[1].get("recordings")) and found[0]["log_bytes"], 8, "a recording")
-    time.sleep(2.5)  # It grows for two seconds.
-    driver.end()
-    with page_of(rig) as page:
-        live(page)
+    record_a_stop(rig)
+    with live_page(rig) as page:
         page.wait_for_selector("#recordings button")
-        files = []
-        for ending in ("log", "jsonl", "conf"):
-            with page.expect_download() as download:
-                page.click(f"#recordings [data-ending='{ending}']")
-            path = rig.path(download.value.suggested_filename)
-            download.value.save_as(path)
-            assert Path(path).stat().st_size > 100
-            files.append(path)
-        with page.expect_download() as download:
-            page.click("#recordings [data-ending='csv']")
-        download.value.save_as(rig.path("recording.csv"))
-        table = list(csv.DictReader(Path(rig.path("recording.csv")).read_text(encoding="ascii").splitlines()))
+        files = [download(rig, page, f"#recordings [data-ending='{ending}']") for ending in ("log", "jsonl", "conf")]
+        assert all(path.stat().st_size > 100 for path in files)
+        table = list(csv.DictReader(download(rig, page, "#recordings [data-ending='csv']", "recording.csv").read_text(encoding="ascii").splitlines()))
         assert {row["wheel"] for row in table} == {"left", "right"} and [float(row["t_s"]) for row in table] == sorted(float(row["t_s"]) for row in table)
         assert 150 < max(float(row["measured_mm_s"] or 0) for row in table) < 260 and any(row["force_raw_N"] for row in table)
         speed = pytest.approx(382, abs=1)
         assert page.evaluate(OLD_SPEED) == [[500, 500, 500, 500, None], [None, speed, speed, None, speed]]
         page.evaluate("MCAP.chunk_bytes = 4096")
-        with page.expect_download() as download:
-            page.click("#recordings [data-ending='mcap']")
-        download.value.save_as(rig.path("recording.mcap"))
-        compare_mcap(Path(rig.path("recording.mcap")), table, Path(files[0]).read_text(encoding="ascii"))
+        compare_mcap(download(rig, page, "#recordings [data-ending='mcap']", "recording.mcap"), table, files[0].read_text(encoding="ascii"))
         page.click("#recordings button:text-is('Open')")
         page.wait_for_selector("#player:not([hidden])")
         fastest = "Math.max(...page.recording.wheels[0].speed.data[3].filter((v) => v !== null))"
@@ -444,15 +464,12 @@ def begin(page, what):
 
 def test_stop_is_not_late_while_a_recording_is_decoded(rig):
     list_recording(rig)
-    rig.start().connected()
-    with page_of(rig, locale="de-DE") as page:
-        live(page)
+    with live_page(rig, locale="de-DE") as page:
         page.wait_for_selector("#recordings button")
         page.evaluate(LONG)
         saved = []
         page.on("download", lambda one: saved.append(one.suggested_filename[-4:]))
-        box = page.locator("#stop").bounding_box()
-        page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+        page.mouse.move(*middle_of(page, "#stop"))
         for what in ("[data-ending=mcap]", "[data-ending=csv]", "button"):
             begin(page, what)
             for _ in range(5):
@@ -477,9 +494,7 @@ def test_stop_is_not_late_while_a_recording_is_decoded(rig):
 
 def test_decoding_shows_progress_and_is_cancelled_or_replaced(rig):
     list_recording(rig)
-    rig.start().connected()
-    with page_of(rig, "phone") as page:
-        live(page)
+    with live_page(rig, "phone") as page:
         page.wait_for_selector("#recordings button")
         page.evaluate(LONG)
         saved = []
@@ -500,9 +515,7 @@ def test_decoding_shows_progress_and_is_cancelled_or_replaced(rig):
 
 
 def test_plots_follow_freeze_zoom_and_are_saved(rig):
-    rig.start().connected()
-    with page_of(rig) as page:
-        live(page)
+    with live_page(rig) as page:
         driver = Driver(rig)
         time.sleep(1.5)
         newest = "plots.left.speed.uplot.scales.x.max"
@@ -518,10 +531,7 @@ def test_plots_follow_freeze_zoom_and_are_saved(rig):
         page.click("#live")
         seen(page, f"{newest} > {frozen}")
         for ending, least in (("CSV", 100), ("PNG", 1000)):
-            with page.expect_download() as download:
-                page.click(f"#left .plot:first-of-type button:text-is('{ending}') >> nth=0")
-            path = Path(rig.path("saved"))
-            download.value.save_as(path)
+            path = download(rig, page, f"#left .plot:first-of-type button:text-is('{ending}') >> nth=0", "saved")
             assert path.stat().st_size > least, path.stat().st_size
             if ending == "CSV":
                 lines = path.read_text(encoding="ascii").splitlines()
@@ -532,9 +542,7 @@ def test_plots_follow_freeze_zoom_and_are_saved(rig):
 
 
 def test_recording_is_begun_and_ended_by_the_page(rig):
-    rig.start().connected()
-    with page_of(rig, "phone") as page:
-        live(page)
+    with live_page(rig, "phone") as page:
         page.wait_for_selector("#record:visible")
         assert page.inner_text("#record") == "Start a recording"
         page.click("#record")
@@ -543,11 +551,7 @@ def test_recording_is_begun_and_ended_by_the_page(rig):
         page.click("#record")
         seen(page, "document.querySelector('#record').textContent === 'Start a recording' && document.querySelector('#record-says').textContent === ''")
         seen(page, "document.querySelector('#recordings h3')?.textContent === 'Recorded on request'")
-        with page.expect_download() as download:
-            page.click("#recordings [data-ending='log']")
-        path = Path(rig.path("requested.log"))
-        download.value.save_as(path)
-        assert path.stat().st_size > 10_000
+        assert download(rig, page, "#recordings [data-ending='log']", "requested.log").stat().st_size > 10_000
         page.click("#recordings button:text-is('Open')")
         page.wait_for_selector("#player:not([hidden])")
         assert abs(float(page.input_value("#at"))) <= 0.01, "0 is its begin"
@@ -627,13 +631,10 @@ def test_fleet_page_shows_each_machine_marks_old_ones_and_fits(rig):
             assert "<img src=x onerror=alert(1)>" in cells[3][2] and cells[3][3] == "24.8 V / unknown" and not page.query_selector("#machines img"), cells[3]
             facts = page.evaluate("['count', 'online', 'latched', 'contradicted'].map((id) => document.getElementById(id).textContent)")
             assert facts == ["4", "3", "walker-2", "wheel_radius on 2 of 4; track on 1 of 4"], facts
-            if os.environ.get("IWHEEL_WEB_SHOTS"):
-                page.screenshot(path=Path(os.environ["IWHEEL_WEB_SHOTS"]) / f"fleet-{size}.png", full_page=True)
+            shot(page, f"fleet-{size}", full_page=True)
             assert page.evaluate("document.documentElement.scrollWidth - innerWidth") <= 0, size
             if axe.is_file():
-                page.context.new_cdp_session(page).send("Runtime.evaluate", {"expression": axe.read_text(encoding="utf-8")})
-                found = page.evaluate("axe.run(document, {resultTypes: ['violations']})")["violations"]
-                assert not found, [(one["id"], [node["target"] for node in one["nodes"]][:4]) for one in found]
+                assert_accessible(page, axe)
             write_fleet(rig, 60)
             seen(page, "document.querySelector('#news').textContent.startsWith('OLD')")
             os.unlink(rig.path("fleet.json"))
@@ -651,15 +652,10 @@ def test_page_is_accessible_and_fits_each_theme_and_screen(rig):
     rig.ask("POST", "/api/estop")
     until(lambda: rig.ask_json("GET", "/api/recordings")[1].get("recordings"), what="a recording")
     for size, scheme in (("desk", "light"), ("phone", "dark"), ("phone", "light"), ("desk", "dark")):
-        with page_of(rig, size, scheme) as page:
-            live(page)
+        with live_page(rig, size, scheme) as page:
             page.wait_for_selector("#recordings button")
             page.evaluate("new Promise((done) => setTimeout(done, 300))")
-            # As a debugger it is not bound by the page's policy.
-            session = page.context.new_cdp_session(page)
-            session.send("Runtime.evaluate", {"expression": axe.read_text(encoding="utf-8")})
-            found = page.evaluate("axe.run(document, {resultTypes: ['violations']})")["violations"]
-            assert not found, [(one["id"], [node["target"] for node in one["nodes"]][:4]) for one in found]
+            assert_accessible(page, axe)
             wide = page.evaluate("document.documentElement.scrollWidth - innerWidth")
             assert wide <= 0, f"{size}: {wide} pixels too wide"
             small = page.evaluate("[...document.querySelectorAll('#bar button')].map((e) => e.getBoundingClientRect().height)")
@@ -687,14 +683,12 @@ def press_stop(page, rig):
     assert late < 1000, f"{late} ms"
     driver.end()
     driver.client.close()
-    until(lambda: rig.ask_json("GET", "/api/status")[1]["state"] == "listening", what="the wheels are at standstill")
+    rig.at_standstill()
 
 
 @pytest.mark.rig(driving=True)
 def test_stop_works_while_a_dialog_of_the_page_is_open(rig):
-    rig.start().connected()
-    with page_of(rig, "phone") as page:
-        live(page)
+    with live_page(rig, "phone") as page:
         for button in ("#estop-ask", "#arm"):
             page.click(button)
             assert page.evaluate("document.querySelector('#ask').open")
@@ -717,8 +711,7 @@ def test_stop_never_leaves_the_screen_by_zoom_or_size(rig):
             page.context.new_cdp_session(page).send("Emulation.setPageScaleFactor", {"pageScaleFactor": 3})
             seen(page, "visualViewport.scale > 1.5")
             time.sleep(0.3)
-            if os.environ.get("IWHEEL_WEB_SHOTS"):
-                page.screenshot(path=Path(os.environ["IWHEEL_WEB_SHOTS"]) / f"zoom-{width}.png")
+            shot(page, f"zoom-{width}")
             press_stop(page, rig)
 
 
@@ -730,14 +723,12 @@ def test_stop_never_needs_the_token_or_the_login(rig):
 
 
 def test_delivered_goes_with_the_next_state(rig):
-    rig.start().connected()
-    with page_of(rig) as page:
-        live(page)
+    with live_page(rig) as page:
         driver = Driver(rig)
         page.click("#stop")
         seen(page, "document.querySelector('#delivered').textContent.startsWith('Stop delivered')")
         driver.end()
-        until(lambda: rig.ask_json("GET", "/api/status")[1]["state"] == "listening", what="the wheels are at standstill")
+        rig.at_standstill()
         seen(page, "document.querySelector('#delivered').textContent === ''")
 
 
@@ -761,8 +752,7 @@ def test_page_never_sends_its_token(rig):
                 if one.fileno() < 0:
                     return
 
-    with page_of(rig) as page:
-        live(page)
+    with live_page(rig) as page:
         rig.web.signal(signal.SIGKILL)
         rig.web.wait(2)
         with socket.create_server(("127.0.0.1", rig.port)) as thief:
@@ -776,8 +766,7 @@ def test_page_never_sends_its_token(rig):
 
 def test_page_has_no_service_worker(rig):
     rig.start()
-    with page_of(rig) as page:
-        live(page)
+    with live_page(rig) as page:
         assert page.evaluate("navigator.serviceWorker.getRegistrations().then((all) => all.length)") == 0
         assert page.evaluate("navigator.serviceWorker.register('/page.js').then(() => 'registered', () => 'refused')") == "refused"
         page.said.clear()
@@ -785,12 +774,8 @@ def test_page_has_no_service_worker(rig):
 
 @pytest.mark.rig(driving=True)
 def test_reset_button_clears_the_stop_that_is_shown(rig):
-    rig.start().connected()
-    with page_of(rig) as page:
-        live(page)
-        rig.ask("POST", "/api/estop")
-        page.wait_for_selector("#reset:not([hidden])")
-        seen(page, "page.stop !== null")
+    with live_page(rig) as page:
+        latch(rig, page)
         time.sleep(1.2)
         page.click("#reset")
         rig.ask("POST", "/api/stop")
@@ -805,9 +790,7 @@ def test_reset_button_clears_the_stop_that_is_shown(rig):
 def test_page_stays_smooth_at_50_hz(rig):
     """IWHEEL_WEB_MINUTES (5; 60 for the hour) on a phone's size: frame times and memory."""
     minutes = float(os.environ.get("IWHEEL_WEB_MINUTES", "5"))
-    rig.start().connected()
-    with page_of(rig, "phone") as page:
-        live(page)
+    with live_page(rig, "phone") as page:
         driver = Driver(rig)
         page.evaluate("document.querySelector('#left').scrollIntoView()")
         page.evaluate(

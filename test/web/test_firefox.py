@@ -27,10 +27,6 @@ def all_seen(page, ids, what):
         assert area["inside"] and area["card"] and area["free"] and area["whole"] and area["text"].strip(), (what, area)
 
 
-def at_standstill(rig):
-    until(lambda: rig.ask_json("GET", "/api/status")[1]["state"] == "listening", what="the wheels are at standstill")
-
-
 @pytest.mark.rig(driving=True)
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_firefox_first_screen_has_state_and_figures(rig, scheme):
@@ -88,7 +84,7 @@ def test_firefox_stop_acts_by_each_input_above_dialogs(rig):
             page.seen("document.querySelector('#delivered').textContent.startsWith('Stop delivered')")
             driver.end()
             driver.client.close()
-            at_standstill(rig)
+            rig.at_standstill()
 
 
 @pytest.mark.rig(driving=True)
@@ -116,7 +112,7 @@ def test_firefox_pad_drives_by_touch_until_released(rig):
             assert late < 1000, f"{end}: {late} ms"
             assert not page.evaluate("drive.held"), end
             page.let_go()
-            at_standstill(rig)
+            rig.at_standstill()
             until(lambda: rig.ask_json("GET", "/api/status")[1]["lease"]["holder"] is None, what="no client drives")
 
 

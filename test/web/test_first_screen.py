@@ -4,18 +4,16 @@
 import contextlib
 import json
 import math
-import os
 import re
 import threading
 import time
-from pathlib import Path
 
 import pytest
 from bus import now_us
 from judge_log import LEFT, RIGHT
 from test_bridge import start_lan
-from test_browser import SIZES, live, mouse_on_stop, page_of, press_stop, seen, turns
-from trials import RECENT_US, Driver, braking_ms, until
+from test_browser import SIZES, brakes_ms, latch, live, live_page, middle_of, mouse_on_stop, page_of, press_stop, record_a_stop, seen, shot, turns
+from trials import RECENT_US, Driver, until
 
 PHONES = {"portrait": (390, 844), "landscape": (844, 390), "small": (320, 568)}
 SIZES.update(PHONES)
@@ -36,13 +34,6 @@ def touch(size):
     return {} if size == "wide" else {"is_mobile": True, "has_touch": True}
 
 
-def shot(page, name, at=None):
-    if os.environ.get("IWHEEL_WEB_SHOTS"):
-        if at:
-            page.locator(at).scroll_into_view_if_needed()
-        page.screenshot(path=Path(os.environ["IWHEEL_WEB_SHOTS"]) / f"{name}.png")
-
-
 # Cells of the assumptions that a person sees only after scrolling to the right.
 CELLS_OUTSIDE = """[...document.querySelectorAll('#ledger :is(th, td)')].filter((one) => one.getBoundingClientRect().right >
   document.querySelector('#ledger').closest('.card').getBoundingClientRect().right).map((one) => one.textContent)"""
@@ -56,10 +47,8 @@ def all_seen(page, ids, what):
 @pytest.mark.rig(driving=True)
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_state_figures_and_last_stop_are_on_the_first_screen(rig, scheme):
-    rig.start().connected()
     for size in VIEWS:
-        with page_of(rig, size, scheme, **touch(size)) as page:
-            live(page)
+        with live_page(rig, size, scheme, **touch(size)) as page:
             all_seen(page, ["word", "sentence", "last-stop", *FIGURES, "stop", "estop-ask"], size)
             assert page.inner_text("#word") == "Ready" and page.evaluate("document.querySelector('#now').dataset.tone") == "good"
             assert min(area["size"] for area in page.evaluate(AREAS, FIGURES)) >= 20, size
@@ -68,8 +57,7 @@ def test_state_figures_and_last_stop_are_on_the_first_screen(rig, scheme):
     rig.sim.ask("estop press")
     until(lambda: rig.ask_json("GET", "/api/stops")[1]["stops"], what="the stop is known")
     for size in VIEWS:
-        with page_of(rig, size, scheme, **touch(size)) as page:
-            live(page)
+        with live_page(rig, size, scheme, **touch(size)) as page:
             seen(page, "document.querySelector('#last-stop').textContent.includes('e-stop pressed')")
             all_seen(page, ["word", "sentence", "reset", "last-stop", *FIGURES, "stop"], size)
             assert page.inner_text("#word") == "Latched" and "press Reset" in page.inner_text("#sentence")
@@ -78,9 +66,7 @@ def test_state_figures_and_last_stop_are_on_the_first_screen(rig, scheme):
 
 
 def test_large_figures_are_those_of_the_snapshot(rig):
-    rig.start().connected()
-    with page_of(rig, "portrait", **touch("portrait")) as page:
-        live(page)
+    with live_page(rig, "portrait", **touch("portrait")) as page:
         driver = Driver(rig, 200)
         for unit, factor, digits in (("m/s", 0.001, 2), ("km/h", 0.0036, 1)):
             page.select_option("#units", unit)
@@ -108,9 +94,7 @@ def test_large_figures_are_those_of_the_snapshot(rig):
 @pytest.mark.rig(driving=True)
 @pytest.mark.parametrize("size", VIEWS)
 def test_stop_is_usable_above_dialogs_zoomed_and_in_large_text(rig, size):
-    rig.start().connected()
-    with page_of(rig, size, **touch(size)) as page:
-        live(page)
+    with live_page(rig, size, **touch(size)) as page:
         for zoom, text in ((1, 100), (3.3, 100), (1, 200)):
             page.evaluate(f"document.documentElement.style.fontSize = '{text}%'")
             for button in ("#estop-ask", "#arm"):
@@ -130,12 +114,8 @@ def test_stop_is_usable_above_dialogs_zoomed_and_in_large_text(rig, size):
 
 @pytest.mark.rig(driving=True)
 def test_stop_cancels_the_question_of_reset(rig):
-    rig.start().connected()
-    with page_of(rig, "small", **touch("small")) as page:
-        live(page)
-        rig.ask("POST", "/api/estop")
-        page.wait_for_selector("#reset:visible")
-        seen(page, "page.stop !== null")
+    with live_page(rig, "small", **touch("small")) as page:
+        latch(rig, page)
         for zoom, text in ((1, 100), (3.3, 100), (1, 200)):
             page.evaluate(f"document.documentElement.style.fontSize = '{text}%'; document.querySelector('#reset').click()")
             page.context.new_cdp_session(page).send("Emulation.setPageScaleFactor", {"pageScaleFactor": zoom})
@@ -149,38 +129,27 @@ def test_stop_cancels_the_question_of_reset(rig):
 
 
 def test_two_fingers_do_not_zoom_the_page(rig):
-    rig.start().connected()
-    with page_of(rig, "portrait", **touch("portrait")) as page:
-        live(page)
+    with live_page(rig, "portrait", **touch("portrait")) as page:
         session = page.context.new_cdp_session(page)
         for selector in ("#word", "#figures", "#stop", "#left .plot [role=img]"):
             page.locator(selector).first.scroll_into_view_if_needed()
-            box = page.locator(selector).first.bounding_box()
-            session.send(
-                "Input.synthesizePinchGesture",
-                {"x": box["x"] + box["width"] / 2, "y": box["y"] + box["height"] / 2, "scaleFactor": 3.3, "gestureSourceType": "touch"},
-            )
+            x, y = middle_of(page, f"{selector} >> nth=0")
+            session.send("Input.synthesizePinchGesture", {"x": x, "y": y, "scaleFactor": 3.3, "gestureSourceType": "touch"})
             assert page.evaluate("visualViewport.scale") == 1, selector
 
 
 def test_stop_is_first_in_the_tab_order(rig):
-    rig.start().connected()
-    with page_of(rig) as page:
-        live(page)
+    with live_page(rig) as page:
         page.keyboard.press("Tab")
         assert page.evaluate("document.activeElement.id") == "stop"
         driver = Driver(rig)
-        since = now_us()
-        page.keyboard.press("Enter")
-        assert braking_ms(rig, since) < 500
+        assert brakes_ms(rig, lambda: page.keyboard.press("Enter")) < 500
         driver.end()
 
 
 def test_page_has_no_bar_across_in_any_size_and_text(rig):
-    rig.start().connected()
     for size in VIEWS:
-        with page_of(rig, size, **touch(size)) as page:
-            live(page)
+        with live_page(rig, size, **touch(size)) as page:
             for text in (100, 200):
                 page.evaluate(f"document.documentElement.style.fontSize = '{text}%'")
                 time.sleep(0.2)
@@ -202,8 +171,7 @@ def test_stop_of_the_page_is_quick_while_ninety_others_poll(rig):
             over.wait(0.2)
 
     pollers = [threading.Thread(target=poll, daemon=True) for _ in range(90)]
-    with page_of(rig, "portrait", **touch("portrait")) as page:
-        live(page)
+    with live_page(rig, "portrait", **touch("portrait")) as page:
         for one in pollers:
             one.start()
         time.sleep(1)
@@ -224,10 +192,8 @@ def switch_on(page):
 
 @pytest.mark.rig(driving=True)
 def test_pad_in_each_size_is_visible_with_state_and_estop(rig):
-    rig.start().connected()
     for size in VIEWS:
-        with page_of(rig, size, **touch(size)) as page:
-            live(page)
+        with live_page(rig, size, **touch(size)) as page:
             switch_on(page)
             time.sleep(0.3)
             names = ["pad-word", "pad-estop", "pad-command", "pad-measured", "pad-limit", "pad-off"]
@@ -243,7 +209,7 @@ def test_pad_in_each_size_is_visible_with_state_and_estop(rig):
             for words in page.evaluate("['pad-command', 'pad-measured', 'pad-limit'].map((id) => document.getElementById(id).textContent)"):
                 assert re.fullmatch(r"-?\d\.\d\d m/s, -?\d+\s°/s", words), (size, words)
             page.mouse.up()
-            until(lambda: rig.ask_json("GET", "/api/status")[1]["state"] == "listening", what="the wheels are at standstill")
+            rig.at_standstill()
             page.click("#pad-off")
             assert page.evaluate("!drive.on && document.activeElement.id === 'arm'")
 
@@ -256,9 +222,7 @@ def commanded(rig):
 
 @pytest.mark.rig(driving=True)
 def test_pad_with_two_keys_drives_a_curve_until_one_is_released(rig):
-    rig.start().connected()
-    with page_of(rig) as page:
-        live(page)
+    with live_page(rig) as page:
         switch_on(page)
         page.keyboard.down("ArrowUp")
         until(lambda: min(commanded(rig)) > 100, what="straight ahead")
@@ -267,9 +231,7 @@ def test_pad_with_two_keys_drives_a_curve_until_one_is_released(rig):
         assert sum(commanded(rig)) > 200
         page.keyboard.up("ArrowLeft")
         until(lambda: min(commanded(rig)) > 100 and abs(commanded(rig)[1] - commanded(rig)[0]) < 10, what="straight ahead again")
-        since = now_us()
-        page.keyboard.up("ArrowUp")
-        assert braking_ms(rig, since) < 500
+        assert brakes_ms(rig, lambda: page.keyboard.up("ArrowUp")) < 500
 
 
 def fingers(session, kind, *places):
@@ -280,9 +242,7 @@ def fingers(session, kind, *places):
 
 @pytest.mark.rig(driving=True)
 def test_pad_by_touch_drives_and_a_second_finger_stops(rig):
-    rig.start().connected()
-    with page_of(rig, "portrait", **touch("portrait")) as page:
-        live(page)
+    with live_page(rig, "portrait", **touch("portrait")) as page:
         switch_on(page)
         session = page.context.new_cdp_session(page)
         box = page.locator("#pad").bounding_box()
@@ -290,12 +250,10 @@ def test_pad_by_touch_drives_and_a_second_finger_stops(rig):
         for second, begins in (((one[0] + 60, one[1] + 60), "on the pad"), ((20, 20), "elsewhere")):
             fingers(session, "touchStart", one)
             turns(rig)
-            since = now_us()
-            fingers(session, "touchStart", one, second)
-            assert braking_ms(rig, since) < 500, begins
+            assert brakes_ms(rig, lambda: fingers(session, "touchStart", one, second)) < 500, begins
             seen(page, "document.querySelector('#pad-says').textContent.includes('second finger')")
             fingers(session, "touchMove", (one[0] + 5, one[1]), second)
-            until(lambda: rig.ask_json("GET", "/api/status")[1]["state"] == "listening", what="the wheels are at standstill")
+            rig.at_standstill()
             assert not page.evaluate("drive.held"), "a finger that stayed does not drive again"
             fingers(session, "touchEnd")
             time.sleep(0.6)
@@ -303,12 +261,8 @@ def test_pad_by_touch_drives_and_a_second_finger_stops(rig):
 
 @pytest.mark.rig(driving=True)
 def test_reset_on_the_first_screen_clears_the_latch(rig):
-    rig.start().connected()
-    with page_of(rig, "small", **touch("small")) as page:
-        live(page)
-        rig.ask("POST", "/api/estop")
-        page.wait_for_selector("#reset:visible")
-        seen(page, "page.stop !== null")
+    with live_page(rig, "small", **touch("small")) as page:
+        latch(rig, page)
         time.sleep(1.2)
         page.tap("#reset")
         page.tap("#ask-yes")
@@ -316,9 +270,7 @@ def test_reset_on_the_first_screen_clears_the_latch(rig):
 
 
 def test_token_is_kept_and_can_be_forgotten(rig):
-    rig.start().connected()
-    with page_of(rig) as page:
-        live(page)
+    with live_page(rig) as page:
         page.goto("about:blank")
         page.goto(rig.url.split("#")[0])
         live(page)
@@ -356,15 +308,13 @@ def test_page_in_german_browser_is_german_english_on_request(rig):
     rig.sim.ask("estop press")
     until(lambda: rig.ask_json("GET", "/api/stops")[1]["stops"], what="the stop is known")
     for size in VIEWS:
-        with page_of(rig, size, locale="de-AT", **touch(size)) as page:
-            live(page)
+        with live_page(rig, size, locale="de-AT", **touch(size)) as page:
             seen(page, "document.querySelector('#last-stop').textContent.includes('Not-Halt')")
             all_seen(page, ["word", "sentence", "reset", "last-stop", *FIGURES, "stop"], size)
             assert page.inner_text("#word") == "Gesperrt" and page.evaluate("document.documentElement.lang") == "de"
             assert page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth") <= 0, size
             shot(page, f"german-{size}")
-    with page_of(rig, locale="fr-FR") as page:
-        live(page)
+    with live_page(rig, locale="fr-FR") as page:
         assert page.inner_text("#word") == "Latched"
         for language, word in (("de", "Gesperrt"), ("en", "Latched")):
             with page.expect_navigation():  # The page loads again.
@@ -383,9 +333,7 @@ def scale(page, side, what, axis="x"):
 
 
 def test_plots_have_common_axes_spans_and_marks(rig):
-    rig.start().connected()
-    with page_of(rig) as page:
-        live(page)
+    with live_page(rig) as page:
         page.evaluate("document.querySelector('#tools').scrollIntoView()")
         driver = Driver(rig, 200)  # The start of a browser may stall a small machine for longer than the driver's lease.
         rig.sim.ask("load left 30")
@@ -413,15 +361,12 @@ def test_plots_have_common_axes_spans_and_marks(rig):
 
 
 def test_plots_are_dragged_and_pinched_by_touch(rig):
-    rig.start().connected()
-    with page_of(rig, "portrait", **touch("portrait")) as page:
-        live(page)
+    with live_page(rig, "portrait", **touch("portrait")) as page:
         page.click("#freeze")
         page.locator("#left .plot .canvas").first.scroll_into_view_if_needed()
         time.sleep(0.5)
-        box = page.locator("#left .plot .canvas").first.bounding_box()
+        middle, y = middle_of(page, "#left .plot .canvas >> nth=0")
         session = page.context.new_cdp_session(page)
-        y, middle = box["y"] + box["height"] / 2, box["x"] + box["width"] / 2
         before = scale(page, "left", "speed")
         fingers(session, "touchStart", (middle, y))
         for step in range(1, 6):
@@ -439,15 +384,8 @@ def test_plots_are_dragged_and_pinched_by_touch(rig):
 
 
 def test_recording_starts_at_0_and_shows_no_live_values(rig):
-    rig.start().connected()
-    driver = Driver(rig)
-    until(lambda: (rig.bus.speed_rpm(0) or 0) >= 9, what="180 mm/s are measured")
-    rig.sim.ask("estop press")
-    until(lambda: (found := rig.ask_json("GET", "/api/recordings")[1].get("recordings")) and found[0]["log_bytes"], 8, "a recording")
-    time.sleep(2.5)  # It grows for two seconds.
-    driver.end()
-    with page_of(rig) as page:
-        live(page)
+    record_a_stop(rig)
+    with live_page(rig) as page:
         assert page.locator("#left > details").is_visible()
         page.click("#recordings button:text-is('Open')")
         page.wait_for_selector("#player:not([hidden])")
@@ -469,8 +407,7 @@ def test_page_of_the_lan_is_live_and_an_app(rig):
     """As a phone opens it from the QR code, past the browser's warning."""
     rig.start_gateway()
     url, _ = start_lan(rig)
-    with page_of(rig, "portrait", url=url, ignore_https_errors=True, **touch("portrait")) as page:
-        live(page)
+    with live_page(rig, "portrait", url=url, ignore_https_errors=True, **touch("portrait")) as page:
         assert page.evaluate("isSecureContext") and "token" not in page.url
         manifest = page.evaluate("fetch(document.querySelector('link[rel=manifest]').href).then((answer) => answer.json())")
         assert manifest["display"] == "standalone" and manifest["start_url"] == "/"
@@ -480,9 +417,7 @@ def test_page_of_the_lan_is_live_and_an_app(rig):
 
 
 def test_cause_that_prevents_driving_is_one_sentence(rig):
-    rig.start().connected()
-    with page_of(rig, "small", **touch("small")) as page:
-        live(page)
+    with live_page(rig, "small", **touch("small")) as page:
         rig.sim.ask("power off")
         seen(page, "document.querySelector('#word').textContent === 'Not ready'")
         assert page.inner_text("#sentence") == "Wheel offline: switch the wheels on; check their cable and the termination."
@@ -492,12 +427,9 @@ def test_cause_that_prevents_driving_is_one_sentence(rig):
 
 @pytest.mark.rig(driving=True)
 def test_pad_closes_when_the_bridge_forbids_driving(rig):
-    rig.start().connected()
-    with page_of(rig, "portrait", **touch("portrait")) as page:
-        live(page)
+    with live_page(rig, "portrait", **touch("portrait")) as page:
         switch_on(page)
-        rig.web.signal(15)
-        rig.web.wait(5)
+        rig.end_web()
         rig.web_settings["drive"] = {"enabled": "no"}
         rig.start_web()
         live(page)

@@ -6,6 +6,7 @@ import hmac
 import http.client
 import json
 import secrets
+import signal
 import socket
 import sys
 from pathlib import Path
@@ -16,6 +17,7 @@ sys.path[:0] = [str(ROOT / "test/system"), str(ROOT / "test/support")]
 from bus import now_us
 from free_port import free_port
 from harness import WORDS, Process, Rig
+from settings_file import write_settings
 from trials import until
 
 # For any machine, however busy; as in the demonstration.
@@ -99,9 +101,7 @@ class WebRig(Rig):
         return self
 
     def write_web(self):
-        with open(self.path("web.conf"), "w", encoding="utf-8") as file:
-            for section, keys in self.web_settings.items():
-                file.write(f"[{section}]\n" + "".join(f"{key} = {value}\n" for key, value in keys.items()))
+        write_settings(self.path("web.conf"), self.web_settings)
 
     def start_web(self, wait=True):
         self.write_web()
@@ -110,6 +110,19 @@ class WebRig(Rig):
         if wait:
             until(self.answers, what=f"the bridge answers: {self.web.text()}")
         return self.web
+
+    def end_web(self, seconds=5):
+        self.web.signal(signal.SIGTERM)
+        assert self.web.wait(seconds) == 0, self.web.text()
+
+    def starts_web(self):
+        """It starts, whatever it answers."""
+        web = self.start_web(wait=False)
+        until(lambda: "its address with the token" in web.text(), what="it starts")
+
+    def refuses_to_start(self, code, words, about=""):
+        web = self.start_web(wait=False)
+        assert web.wait(5) == code and words in web.text(), (about, web.text())
 
     def answers(self):
         if self.web.child.poll() is not None:
@@ -161,6 +174,9 @@ class WebRig(Rig):
             self.person.begin()
             self.proved = self.web
         return self.person.header(method, path)
+
+    def at_standstill(self):
+        until(lambda: self.ask_json("GET", "/api/status")[1]["state"] == "listening", what="the wheels are at standstill")
 
     def ask_json(self, method, path, **options):
         status, body = self.ask(method, path, **options)
