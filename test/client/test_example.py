@@ -49,6 +49,11 @@ class Example(RigCase):
         with Gateway(self.socket) as gateway:
             return gateway.why()["cause"]
 
+    def assert_ends(self, child, code, words):
+        _, err = child.communicate(timeout=10)
+        self.assertEqual(code, child.returncode)
+        self.assertIn(words, err)
+
     def test_example_drives_for_its_time_and_stops(self):
         begin_us = now_us()
         child = self.start(1)
@@ -79,18 +84,14 @@ class Example(RigCase):
         time.sleep(1.5)
         thawed_us = now_us()
         child.send_signal(signal.SIGCONT)
-        _, err = child.communicate(timeout=10)
-        self.assertEqual(1, child.returncode)
-        self.assertIn("arm", err)  # The gateway refuses the next command and names the remedy.
+        self.assert_ends(child, 1, "arm")  # The gateway refuses the next command and names the remedy.
         self.assertLess(self.last_motion_us(), thawed_us)
 
     def test_example_when_gateway_restarts_ends_and_moves_nothing(self):
         child = self.start_driving()
         self.rig.kill_gateway(signal.SIGKILL)
         killed_us = now_us()
-        _, err = child.communicate(timeout=10)
-        self.assertEqual(1, child.returncode)
-        self.assertIn("there is no connection; connect, and arm again", err)
+        self.assert_ends(child, 1, "there is no connection; connect, and arm again")
         self.rig.start_gateway(restart_hold=True)
         time.sleep(0.3)
         self.assertLess(self.last_motion_us(), killed_us + 1000)
@@ -99,20 +100,8 @@ class Example(RigCase):
     def test_program_in_cpp_drives_and_stops(self):
         program = self.rig.path("client")
         library = os.path.join(BUILD, "lib", "client", "libiwheel-client.a")
-        subprocess.run(
-            [
-                "c++",
-                "-std=c++11",
-                "-I",
-                os.path.join(ROOT, "lib", "client", "include"),
-                os.path.join(ROOT, "test", "package", "client.cpp"),
-                library,
-                *SANITIZED,
-                "-o",
-                program,
-            ],
-            check=True,
-        )
+        source, headers = os.path.join(ROOT, "test", "package", "client.cpp"), os.path.join(ROOT, "lib", "client", "include")
+        subprocess.run(["c++", "-std=c++11", "-I", headers, source, library, *SANITIZED, "-o", program], check=True)
         done = subprocess.run([program], capture_output=True, text=True, timeout=10, env={**os.environ, "IWHEEL_SOCKET": self.socket}, check=False)
         self.assertEqual((0, ""), (done.returncode, done.stderr))
         with Gateway(self.socket) as gateway:
@@ -121,11 +110,7 @@ class Example(RigCase):
     def test_example_without_or_with_second_gateway_reports_it(self):
         self.start_driving()
         second = self.start(1)
-        _, err = second.communicate(timeout=10)
-        self.assertEqual(1, second.returncode)
-        self.assertIn("drive_20", err)  # The message names the client that has the lease.
+        self.assert_ends(second, 1, "drive_20")  # The message names the client that has the lease.
         self.socket = "/nonexistent/gateway.sock"
         lost = self.start(1)
-        _, err = lost.communicate(timeout=10)
-        self.assertEqual(1, lost.returncode)
-        self.assertIn("no program listens", err)
+        self.assert_ends(lost, 1, "no program listens")

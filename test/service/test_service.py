@@ -19,6 +19,7 @@ import sys
 import tempfile
 import time
 import unittest
+from pathlib import Path
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 ROOT = os.path.dirname(os.path.dirname(HERE))
@@ -27,6 +28,7 @@ sys.path[:0] = [os.path.join(ROOT, "test", "system"), os.path.join(ROOT, "python
 
 from bus import now_us
 from harness import BECOME_STRANGER, STRANGER, Process, Rig, lock_names
+from trials import until
 from verdict import hold
 
 import iwheel
@@ -58,22 +60,25 @@ def need(*tools):
 
 
 def read(*parts):
-    with open(os.path.join(SHARE, *parts), encoding="utf-8") as file:
-        return file.read()
+    return Path(SHARE, *parts).read_text(encoding="utf-8")
 
 
 def values(unit, key):
     return re.findall(rf"^{key}=(.*)$", read("systemd", unit), re.MULTILINE)
 
 
+def without_programs(unit):
+    """The unit's text: not every build has the programs of the bridges."""
+    return re.sub("/usr/bin/iwheel-[a-z]+", "/bin/true", read("systemd", unit))
+
+
 def complaints_of_udev(rules):
     """udev's messages about a file of rules. The result does not depend on the groups of this machine."""
     need("udevadm")
     with tempfile.TemporaryDirectory() as root:
-        path = os.path.join(root, "usr/lib/udev/rules.d/60-iwheel.rules")
-        os.makedirs(os.path.dirname(path))
-        with open(path, "w", encoding="utf-8") as file:
-            file.write(rules)
+        path = Path(root, "usr/lib/udev/rules.d/60-iwheel.rules")
+        path.parent.mkdir(parents=True)
+        path.write_text(rules, encoding="utf-8")
         command = ["udevadm", "verify", "--resolve-names=never", path]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         if "Unknown command verb" in done.stderr:  # Before systemd 254.
@@ -91,33 +96,38 @@ def read_rules_in(root):
         os.makedirs(root + os.path.dirname(path), exist_ok=True)
         shutil.copy(path, root + path)
     os.makedirs(os.path.join(root, "etc"))
-    with open(os.path.join(root, "etc/group"), "w", encoding="utf-8") as file:
-        file.write("root:x:0:\ngpio:x:1:\n")
+    Path(root, "etc/group").write_text("root:x:0:\ngpio:x:1:\n", encoding="utf-8")
     return subprocess.run(["chroot", root, program, "test", "/sys/none"], capture_output=True, text=True, check=False)
 
 
 class Units(unittest.TestCase):
-    def test_the_exposure_is_small(self):
+    def assert_confined(self, unit, limit):
         need("systemd-analyze")
-        limits = {**dict.fromkeys(GATEWAYS, EXPOSURE_MAX), "iwheel-can-restart@.service": RESTART_EXPOSURE_MAX, ROS2: ROS2_EXPOSURE_MAX, SERIAL: EXPOSURE_MAX}
-        for unit, limit in limits.items():
-            path = os.path.join(SHARE, "systemd", unit)
-            done = subprocess.run(["systemd-analyze", "security", "--offline=true", f"--threshold={limit}", path], capture_output=True, text=True, check=False)
-            self.assertEqual(done.returncode, 0, done.stdout[-200:])
+        path = os.path.join(SHARE, "systemd", unit)
+        done = subprocess.run(["systemd-analyze", "security", "--offline=true", f"--threshold={limit}", path], capture_output=True, text=True, check=False)
+        self.assertEqual(done.returncode, 0, done.stdout[-200:])
 
-    def test_the_units_are_clean(self):
+    def assert_clean(self, texts, name):
+        """systemd has nothing to say about this one of the units, {name: text}."""
         need("systemd-analyze")
         with tempfile.TemporaryDirectory() as folder:
-            for unit, name in {**UNITS, ROS2: ROS2, SERIAL: SERIAL}.items():
-                text = read("systemd", unit).replace("/usr/bin/iwheel-gateway", os.path.join(build, "app/gateway/iwheel-gateway"))
-                text = text.replace("/usr/bin/iwheel-ros2", "/bin/true")  # Not every build has it.
-                text = text.replace("/usr/bin/iwheel-serial", os.path.join(build, "app/bridge/serial/iwheel-serial"))
-                text = re.sub("(?m)^Documentation=.*$", "", text)
-                with open(os.path.join(folder, name), "w", encoding="utf-8") as file:
-                    file.write(text)
-                done = subprocess.run(["systemd-analyze", "verify", os.path.join(folder, name)], capture_output=True, text=True, check=False)
-                ours = [line for line in done.stderr.splitlines() if "iwheel" in line]
-                self.assertEqual((ours, done.returncode), ([], 0), done.stderr)
+            for unit, text in texts.items():
+                Path(folder, unit).write_text(re.sub("(?m)^Documentation=.*$", "", text), encoding="utf-8")
+            done = subprocess.run(["systemd-analyze", "verify", os.path.join(folder, name)], capture_output=True, text=True, check=False)
+        self.assertEqual(([line for line in done.stderr.splitlines() if "iwheel" in line], done.returncode), ([], 0), done.stderr)
+
+    def test_the_exposure_is_small(self):
+        limits = {**dict.fromkeys(GATEWAYS, EXPOSURE_MAX), "iwheel-can-restart@.service": RESTART_EXPOSURE_MAX, ROS2: ROS2_EXPOSURE_MAX, SERIAL: EXPOSURE_MAX}
+        for unit, limit in limits.items():
+            self.assert_confined(unit, limit)
+
+    def test_the_units_are_clean(self):
+        made = {}
+        for unit, name in {**UNITS, ROS2: ROS2, SERIAL: SERIAL}.items():
+            text = read("systemd", unit).replace("/usr/bin/iwheel-gateway", os.path.join(build, "app/gateway/iwheel-gateway"))
+            text = text.replace("/usr/bin/iwheel-ros2", "/bin/true")  # Not every build has it.
+            made[name] = text.replace("/usr/bin/iwheel-serial", os.path.join(build, "app/bridge/serial/iwheel-serial"))
+            self.assert_clean(made, name)
 
     def test_systemd_waits_for_the_longest_hold(self):
         """SIGKILL earlier would end the zeros while a wheel still moves."""
@@ -127,20 +137,11 @@ class Units(unittest.TestCase):
             self.assertGreaterEqual(int(wait.removesuffix("s")), longest_s + 30, unit)
 
     def test_watching_bridges_are_confined_and_not_autostarted(self):
-        need("systemd-analyze")
         for unit, ends in ((WEB, "64 77 78"), (MQTT, "64 73 77 78")):
-            path = os.path.join(SHARE, "systemd", unit)
-            command = ["systemd-analyze", "security", "--offline=true", f"--threshold={WEB_EXPOSURE_MAX}", path]
-            done = subprocess.run(command, capture_output=True, text=True, check=False)
-            self.assertEqual(done.returncode, 0, done.stdout[-200:])
+            self.assert_confined(unit, WEB_EXPOSURE_MAX)
             self.assertEqual(values(unit, "SupplementaryGroups"), ["iwheel-watch"])
             self.assertEqual(values(unit, "RestartPreventExitStatus"), [ends])
-            with tempfile.TemporaryDirectory() as folder:
-                text = re.sub("(?m)^Documentation=.*$", "", re.sub("/usr/bin/iwheel-[a-z]+", "/bin/true", read("systemd", unit)))  # Not every build has them.
-                with open(os.path.join(folder, unit), "w", encoding="utf-8") as file:
-                    file.write(text)
-                done = subprocess.run(["systemd-analyze", "verify", os.path.join(folder, unit)], capture_output=True, text=True, check=False)
-                self.assertEqual(([line for line in done.stderr.splitlines() if "iwheel" in line], done.returncode), ([], 0), done.stderr)
+            self.assert_clean({unit: without_programs(unit)}, unit)
 
     def test_ros_bridge_stays_on_this_machine_and_in_its_memory(self):
         self.assertEqual(values(ROS2, "IPAddressDeny"), ["any"])
@@ -163,15 +164,7 @@ class Units(unittest.TestCase):
         self.assertIn(WEB_SOCKET, values(WEB, "After")[0].split())
         # With PartOf, BindsTo or its own restart the port would be free for a moment.
         self.assertNotRegex(read("systemd", WEB_SOCKET), "(?m)^(PartOf|BindsTo|Requires|RemoveOnStop)=")
-        need("systemd-analyze")
-        with tempfile.TemporaryDirectory() as folder:
-            for unit in (WEB, WEB_SOCKET):
-                text = re.sub("(?m)^Documentation=.*$", "", re.sub("/usr/bin/iwheel-[a-z]+", "/bin/true", read("systemd", unit)))
-                with open(os.path.join(folder, unit), "w", encoding="utf-8") as file:
-                    file.write(text)
-            command = ["systemd-analyze", "verify", os.path.join(folder, WEB_SOCKET)]
-            done = subprocess.run(command, capture_output=True, text=True, check=False)
-            self.assertEqual(([line for line in done.stderr.splitlines() if "iwheel" in line], done.returncode), ([], 0), done.stderr)
+        self.assert_clean({unit: without_programs(unit) for unit in (WEB, WEB_SOCKET)}, WEB_SOCKET)
 
     def test_template_differs_only_in_the_name_of_the_bus(self):
         plain, template = (read("systemd", unit).splitlines() for unit in GATEWAYS)
@@ -197,8 +190,7 @@ class Units(unittest.TestCase):
             for tool, kind in (("systemd-sysusers", "sysusers.d"), ("systemd-tmpfiles", "tmpfiles.d")):
                 more = ["--create"] if tool.endswith("tmpfiles") else []
                 subprocess.run([tool, f"--root={root}", *more, os.path.join(SHARE, kind, "iwheel.conf")], check=True)
-            with open(os.path.join(root, "etc/group"), encoding="utf-8") as file:
-                groups = dict(line.strip().split(":", 1) for line in file)
+            groups = dict(line.split(":", 1) for line in Path(root, "etc/group").read_text(encoding="utf-8").splitlines())
             self.assertTrue(groups["gpio"].endswith(":iwheel"))
             for folder, mode in (("run/iwheel", 0o755), ("run/iwheel/watch", 0o2755), ("var/lib/iwheel", 0o750)):
                 self.assertEqual(stat.S_IMODE(os.stat(os.path.join(root, folder)).st_mode), mode)
@@ -226,8 +218,8 @@ class Units(unittest.TestCase):
         self.assertIn("\nTransmitQueueLength=4\n", read("networkd", "70-iwheel-can.link"))
 
     def test_socket_buffers_may_be_as_large_as_requested(self):
-        with open(os.path.join(ROOT, "port/linux/include/iwheel_linux/bus_link.h"), encoding="utf-8") as file:
-            factors = re.search(r"IWL_LINK_ROOM_BYTES \((\d+)U \* (\d+)U \* (\d+)U\)", file.read()).groups()
+        header = Path(ROOT, "port/linux/include/iwheel_linux/bus_link.h").read_text(encoding="utf-8")
+        factors = re.search(r"IWL_LINK_ROOM_BYTES \((\d+)U \* (\d+)U \* (\d+)U\)", header).groups()
         granted = re.search(r"^net\.core\.rmem_max = (\d+)$", read("sysctl.d", "10-iwheel.conf"), re.MULTILINE)
         self.assertEqual(int(granted[1]), math.prod(map(int, factors)))
 
@@ -263,8 +255,7 @@ class Running(unittest.TestCase):
         rig = self.rig()
         never = {int(code) for text in values("iwheel-gateway.service", "RestartPreventExitStatus") for code in text.split()}
         broken = rig.path("broken.conf")
-        with open(broken, "w", encoding="utf-8") as file:
-            file.write("[bus]\ninterfaec = can0\n")
+        Path(broken).write_text("[bus]\ninterfaec = can0\n", encoding="utf-8")
         gateway = rig.program("iwheel-gateway")
         for arguments in (["-c", broken], ["-c", rig.path("missing.conf")], ["--nonsense"], ["-c", "/etc/passwd"]):
             code = subprocess.run([gateway, *arguments], capture_output=True, check=False, timeout=5).returncode
@@ -305,8 +296,7 @@ class Running(unittest.TestCase):
         with open(f"/proc/{tracer}/task/{tracer}/children", encoding="ascii") as file:
             os.kill(int(file.read().split()[0]), signal.SIGTERM)
         self.assertEqual(rig.gateway.wait(15), 0)
-        with open(trace, encoding="utf-8", errors="replace") as file:
-            made = {match[1] for match in re.finditer(r"(?m)^\d+ +(?:<\.\.\. )?([a-z_0-9]+)[( ]", file.read())}
+        made = set(re.findall(r"(?m)^\d+ +(?:<\.\.\. )?([a-z_0-9]+)[( ]", Path(trace).read_text(encoding="utf-8", errors="replace")))
         self.assertTrue({"epoll_wait", "epoll_pwait2"} & made, made)
         made -= {"execve", "exit_group"}  # Called before the filter is installed, and always allowed.
         self.assertEqual(made - self.allowed(), set())
@@ -495,11 +485,12 @@ class Strangers(unittest.TestCase):
         self.addCleanup(self.rig.close)
         os.chmod(self.rig.folder, 0o755)
 
-    def wait_for(self, condition):
-        deadline = time.monotonic() + 5
-        while not condition():
-            self.assertLess(time.monotonic(), deadline, "the condition does not become true")
-            time.sleep(0.02)
+    def make_folder(self, name, mode, owner=0):
+        path = self.rig.path(name)
+        os.mkdir(path)
+        os.chmod(path, mode)
+        os.chown(path, owner, owner)
+        return path
 
     def second(self):
         """Exit code and output of another gateway on the same bus, with its socket elsewhere."""
@@ -527,43 +518,35 @@ class Strangers(unittest.TestCase):
 
     def test_unsafe_folder_is_refused_with_the_fix(self):
         for mode, owner, word in ((0o777, 0, "chmod go-w"), (0o775, 0, "chmod go-w"), (0o755, STRANGER, "make the gateway's user its owner")):
-            folder = self.rig.path(f"folder-{mode:o}-{owner}")
-            os.mkdir(folder)
-            os.chmod(folder, mode)
-            os.chown(folder, owner, owner)
+            folder = self.make_folder(f"folder-{mode:o}-{owner}", mode, owner)
             command = self.rig.gateway_command("--socket", os.path.join(folder, "gateway.sock"))
             done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=5)
             self.assertEqual(done.returncode, 77, done.stderr)
             self.assertIn(word, done.stderr)
 
     def test_socket_in_folder_like_tmp_cannot_block_root(self):
-        shared = self.rig.path("shared")
-        os.mkdir(shared)
-        os.chmod(shared, 0o1777)
+        self.make_folder("shared", 0o1777)
         self.rig.socket_name = "shared/gateway.sock"
         path = self.rig.path(self.rig.socket_name)
         squat = BECOME_STRANGER + "s = socket.socket(socket.AF_UNIX); s.bind(sys.argv[1]); s.listen(); signal.pause()"
         stranger = Process([sys.executable, "-c", squat, path], self.rig.path("squat.out"))
         self.rig.processes.append(stranger)
-        self.wait_for(lambda: os.path.exists(path))
+        until(lambda: os.path.exists(path), 5)
         gateway = Process(self.rig.gateway_command(), self.rig.path("gateway.out"))
         self.rig.processes.append(gateway)
-        self.wait_for(lambda: os.path.exists(path) and os.stat(path).st_uid == 0)
+        until(lambda: os.path.exists(path) and os.stat(path).st_uid == 0, 5)
         self.assertIn("warning: socket", gateway.text())
         with iwheel.Gateway(path, wait=5) as gateway:
             self.assertEqual(gateway.status()["state"], "listening")
 
     def test_record_directory_unsafe_is_reported_and_stays_empty(self):
         for mode, owner, word in ((0o1777, 0, "chmod go-w"), (0o755, STRANGER, "make the gateway's user its owner")):
-            folder = self.rig.path(f"records-{mode:o}")
-            os.mkdir(folder)
-            os.chmod(folder, mode)
-            os.chown(folder, owner, owner)
+            folder = self.make_folder(f"records-{mode:o}", mode, owner)
             self.rig.settings["record"] = {"directory": folder}
             self.rig.write_config()
             self.rig.start_gateway()
             with iwheel.Gateway(self.rig.path("gateway.sock"), timeout=3) as gateway:
-                self.wait_for(lambda: gateway.status()["memory"]["state"] != "loading")
+                until(lambda: gateway.status()["memory"]["state"] != "loading", 5)
                 memory = gateway.status()["memory"]
             self.assertEqual(memory["state"], "failed")
             self.assertIn("put any file there", memory["reason"])
