@@ -4,7 +4,7 @@
 import os
 import subprocess
 
-from harness import find_program
+from harness import STRANGER, find_program
 
 BUILD = os.environ["IWHEEL_BUILD"]
 
@@ -22,6 +22,17 @@ def environment(*without, **more):
 def start(*words, **more):
     """In the background; its output is nobody's."""
     return subprocess.Popen([program(), *words], **{"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, **more})
+
+
+def run_as_stranger(path, *words):
+    """(exit code, stdout, stderr) of another user's process. It starts the program from an open descriptor, because that user may have no right to its path."""
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        user = {"user": STRANGER, "group": STRANGER, "extra_groups": [], "pass_fds": (descriptor,)}
+        done = subprocess.run([f"/proc/self/fd/{descriptor}", *words], capture_output=True, text=True, check=False, **user)
+    finally:
+        os.close(descriptor)
+    return done.returncode, done.stdout, done.stderr
 
 
 def run(*words, name="iwheelctl", env=None, **more):

@@ -6,32 +6,30 @@ import os
 import re
 import shutil
 import signal
-import subprocess
 import tempfile
 import time
 import unittest
 from pathlib import Path
 
+import ctl
 from operator_at_terminal import Operator
 
 from bus import now_us
-from harness import Rig, children, find_program
+from harness import Rig, children
 from trials import until
 from verdict import hold
 
-BUILD = os.environ["IWHEEL_BUILD"]
 GRAVITY = 9.8
 FULL_TURN_M_PER_MM = 2 * 3.14159265 / 1000
 
 
 def environment(runtime=None):
-    clean = {key: value for key, value in os.environ.items() if key not in ("IWHEEL_SOCKET", "NO_COLOR", "XDG_RUNTIME_DIR")}
-    return {**clean, "TERM": "dumb", **({"XDG_RUNTIME_DIR": runtime} if runtime else {})}
+    return ctl.environment("XDG_RUNTIME_DIR", TERM="dumb", **({"XDG_RUNTIME_DIR": runtime} if runtime else {}))
 
 
 class Bringup(unittest.TestCase):
     def setUp(self):
-        self.rig = Rig(BUILD)
+        self.rig = Rig(ctl.BUILD)
         self.addCleanup(self.rig.close)
         self.folder = tempfile.TemporaryDirectory(prefix="iwheel-bringup-test-", ignore_cleanup_errors=True)  # The gateway's last recording may follow.
         self.addCleanup(self.folder.cleanup)
@@ -64,7 +62,7 @@ class Bringup(unittest.TestCase):
         return self.start_from(self.out + ".from", "--can", bus, "--estop", button, *words, variables=variables)
 
     def start_from(self, path, *words, variables=None):
-        operator = Operator([find_program(BUILD, "iwheelctl"), "bringup", self.out, "--from", path, *words], variables or environment(self.runtime))
+        operator = Operator([ctl.program(), "bringup", self.out, "--from", path, *words], variables or environment(self.runtime))
         self.addCleanup(self.end, operator)
         operator.answer("finger on the e-stop?", "y")
         return operator
@@ -302,17 +300,12 @@ class Bringup(unittest.TestCase):
 
     def gateway_takes_it(self):
         """The real gateway starts with the file, and its wheels follow the commands."""
-        done = subprocess.run(
-            [find_program(BUILD, "iwheel-gateway"), "-c", self.out, "--socket", self.rig.path("gateway.sock"), "--check"],
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        self.assertEqual(0, done.returncode, done.stdout + done.stderr)
+        code, out, err = ctl.run("-c", self.out, "--socket", self.rig.path("gateway.sock"), "--check", name="iwheel-gateway")
+        self.assertEqual(0, code, out + err)
 
     def ledger_knows_it(self):
         """A gateway that starts with the file finds the operator's word."""
-        self.rig.gateway_command = lambda *extra: [find_program(BUILD, "iwheel-gateway"), "-c", self.out, "--socket", self.rig.path("gateway.sock"), *extra]
+        self.rig.gateway_command = lambda *extra: [ctl.program("iwheel-gateway"), "-c", self.out, "--socket", self.rig.path("gateway.sock"), *extra]
         self.rig.start_gateway()
         client = self.rig.client()
         entries = self.rig.wait_status(client, lambda s: s["memory"]["state"] == "kept")["ledger"]
@@ -406,9 +399,8 @@ class Bringup(unittest.TestCase):
         self.assertEqual({8}, {len(frame.data) for frame in self.rig.bus.frames if frame.id in (266, 298)})
 
     def test_recording_without_a_speed_leaves_the_types_to_try(self):
-        recording = os.path.join(self.folder.name, "zeros.log")
-        with open(recording, "w", encoding="utf-8") as file:
-            file.writelines(f"({at * 0.02:.6f}) can0 10A#0300000000\n" for at in range(50))
+        recording = Path(self.folder.name, "zeros.log")
+        recording.write_text("".join(f"({at * 0.02:.6f}) can0 10A#0300000000\n" for at in range(50)), encoding="utf-8")
         operator = self.begin("--learn", recording)
         operator.expect("has no setpoint with a speed")
         operator.expect("types to try [0-7] ")
@@ -869,8 +861,7 @@ class Bringup(unittest.TestCase):
     def test_a_running_gateway_is_not_driven_past(self):
         self.rig.start_gateway()
         operator = Operator(
-            [find_program(BUILD, "iwheelctl"), "--socket", self.rig.path("gateway.sock"), "bringup", self.out, "--can", f"unix:{self.rig.path('bus')}"],
-            environment(),
+            [ctl.program(), "--socket", self.rig.path("gateway.sock"), "bringup", self.out, "--can", f"unix:{self.rig.path('bus')}"], environment()
         )
         self.addCleanup(operator.close)
         operator.answer("finger on the e-stop?", "y")
@@ -878,17 +869,9 @@ class Bringup(unittest.TestCase):
         self.leave(operator)
 
     def test_end_of_input_ends_it_and_wrong_words_are_usage(self):
-        program = find_program(BUILD, "iwheelctl")
-        done = subprocess.run(
-            [program, "bringup", "--can", f"unix:{self.rig.path('bus')}", "--estop", "none"],
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            text=True,
-            env=environment(),
-            check=False,
-        )
-        self.assertEqual(1, done.returncode)
-        self.assertIn("Nothing was written", done.stdout)
+        code, out, _ = ctl.run("bringup", "--can", f"unix:{self.rig.path('bus')}", "--estop", "none", env=environment())
+        self.assertEqual(1, code)
+        self.assertIn("Nothing was written", out)
         for words in (("--current", "5"), ("--learn", "/nonexistent"), ("--can",), ("a", "b"), ("--wheel",), ("--can", "a/b")):
-            done = subprocess.run([program, "bringup", *words], stdin=subprocess.DEVNULL, capture_output=True, text=True, env=environment(), check=False)
-            self.assertEqual(64, done.returncode, (words, done.stderr))
+            code, _, err = ctl.run("bringup", *words, env=environment())
+            self.assertEqual(64, code, (words, err))

@@ -13,6 +13,7 @@ import sys
 import tempfile
 import time
 import unittest
+from pathlib import Path
 
 import pytest
 
@@ -38,19 +39,24 @@ except KeyboardInterrupt:
 """
 
 
+def start(name, folder, *words):
+    """A demonstration, with a folder for its temporary files."""
+    return subprocess.Popen(
+        [sys.executable, "-u", os.path.join(ROOT, "app", "demo", name), "--build", BUILD, *words],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        start_new_session=True,
+        env={**os.environ, "TMPDIR": folder},
+    )
+
+
 def play(seconds, signals=(signal.SIGINT,), spacing=0.0, words=("--plain",), begun=True):
     """(exit code, what is left in its temporary folder, its processes that still run, its output). The signals come `seconds` after its first
     line, or after its start if not `begun`."""
     with tempfile.TemporaryDirectory(prefix="d") as folder:
-        process = subprocess.Popen(
-            [sys.executable, os.path.join(ROOT, "app", "demo", "main.py"), "--build", BUILD, *words],
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            start_new_session=True,
-            env={**os.environ, "TMPDIR": folder},
-        )
+        process = start("main.py", folder, *words)
         first = process.stdout.readline() if begun else ""
         time.sleep(seconds)
         for number in signals:
@@ -103,10 +109,9 @@ class Interrupted(unittest.TestCase):
             os.makedirs(os.path.join(folder, "build", "bin"))
             os.makedirs(os.path.join(folder, "tmp"))
             for name in ("iwheel-sim", "iwheel-gateway", "iwheelctl"):
-                path = os.path.join(folder, "build", "bin", name)
-                with open(path, "w", encoding="ascii") as file:
-                    file.write("#!/bin/sh\n" + program)
-                os.chmod(path, 0o755)
+                path = Path(folder, "build", "bin", name)
+                path.write_text("#!/bin/sh\n" + program, encoding="ascii")
+                path.chmod(0o755)
             done = subprocess.run(
                 [sys.executable, os.path.join(ROOT, "app", "demo", "main.py"), "--build", os.path.join(folder, "build")],
                 capture_output=True,
@@ -139,15 +144,7 @@ class Others(unittest.TestCase):
         self.port, self.busy_port = free_port(), free_port()
 
     def start(self, name, *words):
-        process = subprocess.Popen(
-            [sys.executable, "-u", os.path.join(ROOT, "app", "demo", name), "--build", BUILD, *words],
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            start_new_session=True,
-            env={**os.environ, "TMPDIR": self.folder},
-        )
+        process = start(name, self.folder, *words)
         self.addCleanup(process.stdout.close)
         self.addCleanup(process.wait)
         self.addCleanup(process.kill)

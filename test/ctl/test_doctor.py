@@ -3,22 +3,13 @@
 
 import bisect
 import json
-import os
-import pty
-import select
 import signal
-import subprocess
 import time
 import unittest
 
-from harness import Rig, find_program
-
-BUILD = os.environ["IWHEEL_BUILD"]
-
-
-def environment():
-    clean = {key: value for key, value in os.environ.items() if key not in ("IWHEEL_SOCKET", "NO_COLOR")}
-    return {**clean, "TERM": "dumb"}
+from ctl import BUILD, environment, program, run
+from harness import Rig
+from operator_at_terminal import Operator
 
 
 class Doctor(unittest.TestCase):
@@ -27,32 +18,18 @@ class Doctor(unittest.TestCase):
         self.addCleanup(self.rig.close)
         time.sleep(0.5)  # The simulated wheels boot.
 
+    def words(self, listen):
+        return ("--socket", self.rig.path("gateway.sock"), "doctor", f"unix:{self.rig.path('bus')}", "--listen", listen)
+
     def doctor(self, *words):
         """(exit code, {check: [finding]}, the whole object)"""
-        done = subprocess.run(
-            [
-                find_program(BUILD, "iwheelctl"),
-                "--socket",
-                self.rig.path("gateway.sock"),
-                "--json",
-                "doctor",
-                f"unix:{self.rig.path('bus')}",
-                "--listen",
-                "0.6s",
-                *words,
-            ],
-            capture_output=True,
-            text=True,
-            timeout=30,
-            env=environment(),
-            check=False,
-        )
-        whole = json.loads(done.stdout)
+        code, out, _ = run("--json", *self.words("0.6s"), *words)
+        whole = json.loads(out)
         checks = {}
         for finding in whole["findings"]:
             checks.setdefault(finding["check"], []).append(finding)
             self.assertTrue(finding["verdict"] == "ok" or finding["cure"], f"no fix: {finding}")
-        return done.returncode, checks, whole
+        return code, checks, whole
 
     def verdict(self, checks, check):
         return [finding["verdict"] for finding in checks.get(check, [])]
@@ -171,42 +148,14 @@ class Doctor(unittest.TestCase):
         self.assertIn("error passive", checks["bus_state"][0]["text"])
 
     def test_guided_press_on_a_terminal(self):
-        parent, child = pty.openpty()
-        process = subprocess.Popen(
-            [
-                find_program(BUILD, "iwheelctl"),
-                "--socket",
-                self.rig.path("gateway.sock"),
-                "doctor",
-                f"unix:{self.rig.path('bus')}",
-                "--listen",
-                "0.3s",
-                *self.button(),
-            ],
-            stdin=child,
-            stdout=child,
-            stderr=child,
-            env=environment(),
-            close_fds=True,
-        )
-        os.close(child)
-        text, pressed, released = "", False, False
-        end = time.monotonic() + 20
-        while time.monotonic() < end:
-            if select.select([parent], [], [], 0.1)[0]:
-                try:
-                    text += os.read(parent, 4096).decode()
-                except OSError:
-                    break
-            if "Press the e-stop button now" in text and not pressed:
-                pressed = True
-                self.rig.sim.ask("estop press")
-            if "Release it" in text and not released:
-                released = True
-                self.rig.sim.ask("estop release")
-        self.assertEqual(0, process.wait(5), text)
-        os.close(parent)
-        self.assertIn("press and release were seen", text)
+        operator = Operator([program(), *self.words("0.3s"), *self.button()], environment(TERM="dumb"))
+        self.addCleanup(operator.close)
+        operator.expect("Press the e-stop button now")
+        self.rig.sim.ask("estop press")
+        operator.expect("Release it")
+        self.rig.sim.ask("estop release")
+        self.assertEqual(0, operator.wait(), operator.text)
+        operator.expect("press and release were seen")
 
     def test_gateway_without_answer_is_reported_estop_line_unused(self):
         self.rig.start_gateway()
@@ -227,8 +176,6 @@ class Doctor(unittest.TestCase):
             (("--frobnicate",), "does not understand"),
             (("eth0/..",), "IFACE"),
         ):
-            done = subprocess.run(
-                [find_program(BUILD, "iwheelctl"), "doctor", *words], capture_output=True, text=True, timeout=30, env=environment(), check=False
-            )
-            self.assertEqual(64, done.returncode, (words, done.stdout, done.stderr))
-            self.assertIn(about, done.stderr)
+            code, out, err = run("doctor", *words)
+            self.assertEqual(64, code, (words, out, err))
+            self.assertIn(about, err)

@@ -13,7 +13,9 @@ import sys
 import tempfile
 import termios
 import unittest
+from pathlib import Path
 
+import ctl
 import pytest
 
 can = pytest.importorskip("can")
@@ -26,7 +28,6 @@ get_typestore, Stores = (getattr(pytest.importorskip("rosbags.typesys"), name) f
 HERE = os.path.dirname(os.path.abspath(__file__))
 ROOT = os.path.dirname(os.path.dirname(HERE))
 pytestmark = pytest.mark.exact
-PROGRAM = os.path.join(os.environ["IWHEEL_BUILD"], "app", "ctl", "iwheelctl")
 GOLDEN = os.path.join(ROOT, "test", "recordings", "estop.log")
 NUMBERS = [f"{side}_{name}" for side in ("left", "right") for name in ("commanded_m_s", "applied_m_s", "measured_m_s", "net_force_N")]
 # The left wheel: speed 0.5 m/s commanded, 19 rpm measured; times a millisecond apart.
@@ -50,11 +51,14 @@ class Export(unittest.TestCase):
 
     def run_export(self, *words, **more):
         """(exit code, stderr)"""
-        done = subprocess.run(
-            [PROGRAM, "export", *words], cwd=self.folder, env=self.environment, capture_output=True, text=True, timeout=60, check=False, **more
-        )
-        self.assertEqual(done.stdout, "")
-        return done.returncode, done.stderr
+        code, out, err = ctl.run("export", *words, cwd=self.folder, env=self.environment, **more)
+        self.assertEqual(out, "")
+        return code, err
+
+    def refused(self, expected, part, *words):
+        code, said = self.run_export(*words)
+        self.assertEqual(code, expected, said)
+        self.assertIn(part, said)
 
     def export(self, recording, to, *words):
         code, said = self.run_export(recording, "--to", to, *words)
@@ -63,8 +67,7 @@ class Export(unittest.TestCase):
 
     def write(self, name, text):
         path = os.path.join(self.folder, name)
-        with open(path, "w", encoding="utf-8") as file:
-            file.write(text)
+        Path(path).write_text(text, encoding="utf-8")
         return path
 
     def table(self):
@@ -115,8 +118,8 @@ class Export(unittest.TestCase):
         self.assertEqual(samples["left_applied_m_s"].iloc[0], 0.5)
 
     def test_csv_mirrored_wheel_is_in_the_machines_sense(self):
-        with open(GOLDEN.replace(".log", ".conf"), encoding="utf-8") as file:
-            text = re.sub(r"(.*\ninvert *= *)no", r"\1yes", file.read(), flags=re.DOTALL)  # The last one: [right].
+        text = Path(GOLDEN.replace(".log", ".conf")).read_text(encoding="utf-8")
+        text = re.sub(r"(.*\ninvert *= *)no", r"\1yes", text, flags=re.DOTALL)  # The last one: [right].
         self.assertEqual(text.count("invert = yes"), 1)
         config = self.write("mirrored.conf", text)
         table = pandas.read_csv(self.export(self.write("drive.log", lines(FRAMES * 20)), "csv", "--config", config))
@@ -184,8 +187,7 @@ class Export(unittest.TestCase):
             code, said = self.run_export(GOLDEN, "--to", to)
             self.assertNotEqual(code, 0)
             self.assertIn("exists; name another file: --output FILE", said)
-            with open(path, encoding="utf-8") as file:
-                self.assertEqual(file.read(), "mine")
+            self.assertEqual(Path(path).read_text(encoding="utf-8"), "mine")
 
     def test_recording_that_is_none_leaves_no_file(self):
         empty = self.write("empty.log", "")
@@ -197,36 +199,25 @@ class Export(unittest.TestCase):
 
     def test_bad_line_is_reported_and_left_out(self):
         path = self.write("drive.log", lines(FRAMES * 20) + "broken\n")
-        code, said = self.run_export(path, "--to", "csv")
-        self.assertEqual(code, 65)
-        self.assertIn("drive.log:81:", said)
+        self.refused(65, "drive.log:81:", path, "--to", "csv")
         self.assertGreater(len(pandas.read_csv(os.path.join(self.folder, "drive.csv"))), 3)
-        code, said = self.run_export(path, "--to", "blf")
-        self.assertEqual(code, 65)
-        self.assertIn("line 81 is no frame", said)
+        self.refused(65, "line 81 is no frame", path, "--to", "blf")
 
     def test_missing_library_is_named_with_its_fix(self):
         for to, package in (("mcap", "mcap"), ("blf", "python-can"), ("rosbag2", "rosbags")):
-            module = os.path.join(self.folder, to, {"blf": "can"}.get(to, package))
-            os.makedirs(module)
-            with open(os.path.join(module, "__init__.py"), "w", encoding="utf-8") as file:
-                file.write("raise ImportError('absent')\n")
+            module = Path(self.folder, to, {"blf": "can"}.get(to, package))
+            module.mkdir(parents=True)
+            (module / "__init__.py").write_text("raise ImportError('absent')\n", encoding="utf-8")
             self.environment["PYTHONPATH"] = os.pathsep.join([os.path.join(self.folder, to), os.path.join(ROOT, "python", "src")])
-            code, said = self.run_export(GOLDEN, "--to", to)
-            self.assertEqual(code, 65)
-            self.assertIn(f"needs the Python package {package}; install it:", said)
+            self.refused(65, f"needs the Python package {package}; install it:", GOLDEN, "--to", to)
 
     def test_missing_package_is_named_with_its_fix(self):
         self.environment["PYTHONPATH"] = os.path.join(self.folder, "nothing")
-        code, said = self.run_export(GOLDEN, "--to", "csv")
-        self.assertEqual(code, 69)
-        self.assertIn("python3-iwheel", said)
+        self.refused(69, "python3-iwheel", GOLDEN, "--to", "csv")
 
     def test_interface_is_chosen(self):
         path = self.write("two.log", lines(FRAMES * 20) + lines(FRAMES).replace("can0", "can1"))
-        code, said = self.run_export(path, "--to", "csv")
-        self.assertEqual(code, 64, said)
-        self.assertIn("--interface", said)
+        self.refused(64, "--interface", path, "--to", "csv")
         self.assertEqual(os.listdir(self.folder), ["two.log"])
         self.export(path, "csv", "--interface", "can0")
         blf = self.export(path, "blf", "--interface", "can1")
@@ -238,7 +229,7 @@ class Export(unittest.TestCase):
         for to in ("csv", "blf"):
             parent, child = pty.openpty()
             fcntl.ioctl(child, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 80, 0, 0))
-            subprocess.run([PROGRAM, "export", path, "--to", to], cwd=self.folder, env=self.environment, stderr=child, timeout=60, check=True)
+            subprocess.run([ctl.program(), "export", path, "--to", to], cwd=self.folder, env=self.environment, stderr=child, timeout=60, check=True)
             os.close(child)
             said = os.read(parent, 65536).decode()
             os.close(parent)
@@ -252,8 +243,8 @@ class Convert(unittest.TestCase):
     """docs/user/recordings.md has one command for each form of other programs."""
 
     def test_each_other_form_is_converted_with_the_documented_command(self):
-        with open(os.path.join(ROOT, "docs", "user", "recordings.md"), encoding="utf-8") as file:
-            commands = re.findall(r"^ +can_logconvert FILE\.(\w+) FILE\.log", file.read(), re.MULTILINE)
+        page = Path(ROOT, "docs", "user", "recordings.md").read_text(encoding="utf-8")
+        commands = re.findall(r"^ +can_logconvert FILE\.(\w+) FILE\.log", page, re.MULTILINE)
         self.assertEqual(sorted(commands), ["asc", "blf", "trc"])
         frames = list(can.CanutilsLogReader(GOLDEN))[:300]
         folder = tempfile.mkdtemp()
@@ -266,9 +257,9 @@ class Convert(unittest.TestCase):
                     writer.on_message_received(frame)
             program = os.path.join(os.path.dirname(sys.executable), "can_logconvert")
             subprocess.run([sys.executable, program, path, log], check=True, timeout=60)
-            done = subprocess.run([PROGRAM, "--json", "decode", log], capture_output=True, text=True, timeout=60, check=False)
-            self.assertEqual((done.returncode, done.stderr), (0, ""), ending)
-            decoded = [json.loads(line) for line in done.stdout.splitlines()]
+            code, out, err = ctl.run("--json", "decode", log)
+            self.assertEqual((code, err), (0, ""), ending)
+            decoded = [json.loads(line) for line in out.splitlines()]
             self.assertEqual([(one["id"], bytes.fromhex(one["data"])) for one in decoded], [(one.arbitration_id, bytes(one.data)) for one in frames], ending)
 
 

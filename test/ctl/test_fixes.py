@@ -10,12 +10,13 @@ import signal
 import subprocess
 import time
 import unittest
+from pathlib import Path
 
 ROOT = os.path.abspath(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", ".."))
 import pytest
-from harness import Rig, find_program, read_only
+from ctl import BUILD, program, run, run_as_stranger, start
+from harness import Rig, read_only
 
-BUILD = os.environ["IWHEEL_BUILD"]
 # Programs of others that fixes name: the Debian package, and the words that may follow. None: anything.
 PROGRAMS = {
     "apt-get": ("apt", {"install"}),
@@ -36,10 +37,6 @@ PROGRAMS = {
     "usermod": ("passwd", {"-aG"}),
 }
 OURS = {"iwheelctl", "iwheel-sim", "iwheel-gateway"}
-
-
-def program(name):
-    return find_program(BUILD, name)
 
 
 def output(*command):
@@ -63,8 +60,7 @@ def sentences():
         "app/bridge/serial",
     )
     for path in sorted(path for part in parts for path in glob.glob(os.path.join(ROOT, part, "**", "*.c"), recursive=True)):
-        with open(path, encoding="utf-8") as file:
-            source = re.sub(r"//[^\n]*|^#include.*$", "", file.read(), flags=re.MULTILINE)
+        source = re.sub(r"//[^\n]*|^#include.*$", "", Path(path).read_text(encoding="utf-8"), flags=re.MULTILINE)
         for match in re.finditer(rf"{text_of}(?:\s*(?:[A-Z][A-Za-z0-9_]+\s*)?{text_of})*", source):
             pieces = re.findall(r'"((?:[^"\\\n]|\\.)*)"', match.group())
             yield os.path.relpath(path, ROOT), "".join(pieces).replace('\\"', '"').replace("\\n", "\n")
@@ -138,8 +134,7 @@ class EveryCommandExists(unittest.TestCase):
             self.assertTrue(os.path.exists(os.path.join(ROOT, match.group(1))), place)
 
     def test_packages_are_those_that_the_checks_install(self):
-        with open(os.path.join(ROOT, "scripts", "install_tools"), encoding="utf-8") as file:
-            installed = file.read()
+        installed = Path(ROOT, "scripts", "install_tools").read_text(encoding="utf-8")
         for place, match in self.find(r"apt-get install ([a-z][\w.-]+)"):
             self.assertIn(match.group(1).rstrip("."), installed, place)
         for place, match in self.find(r"^(lib\w+-dev)$"):  # Put in for %s.
@@ -208,16 +203,7 @@ class CarriedOut(unittest.TestCase):
         self.addCleanup(self.rig.close)
 
     def ctl(self, *words):
-        done = subprocess.run(
-            [program("iwheelctl"), "--socket", self.rig.path("gateway.sock"), *words],
-            capture_output=True,
-            text=True,
-            timeout=60,
-            check=False,
-            stdin=subprocess.DEVNULL,
-            env={**os.environ, "TERM": "dumb"},
-        )
-        return done.returncode, done.stdout, done.stderr
+        return run("--socket", self.rig.path("gateway.sock"), *words)
 
     def status(self):
         return json.loads(self.ctl("--json", "status")[1])
@@ -265,11 +251,7 @@ class CarriedOut(unittest.TestCase):
 
     def drive_into(self, fault):
         """Drives until the fault has stopped the wheels."""
-        process = subprocess.Popen(
-            [program("iwheelctl"), "--socket", self.rig.path("gateway.sock"), "drive", "300", "300", "--for", "20s"],
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-        )
+        process = start("--socket", self.rig.path("gateway.sock"), "drive", "300", "300", "--for", "20s")
         self.addCleanup(process.wait)
         self.addCleanup(process.terminate)
         self.wait_for(lambda s: (s["left"]["speed_mm_s"] or 0) > 200 or s["state"] == "latched", "driving")
@@ -315,25 +297,21 @@ class CarriedOut(unittest.TestCase):
             self.run_commands(err)
             self.drives()
 
-    def test_wheels_that_were_blocked_drive_when_they_are_free(self):
+    def drives_after_block(self, which, cause, advice):
         self.rig.start_gateway()
-        self.drive_into("block both")
-        self.wait_for(lambda s: s["cause"] == "wheel_blocked", "blocked")
+        self.drive_into(f"block {which}")
+        self.wait_for(lambda s: s["cause"] == cause, cause)
         fix = self.next_step()
-        self.assertIn("free the wheel, then arm again", self.ctl("status")[1].replace("\n", " ") + fix)
-        self.rig.sim.ask("unblock both")
+        self.assertIn(advice, self.ctl("status")[1].replace("\n", " ") + fix)
+        self.rig.sim.ask(f"unblock {which}")
         self.wait_for(lambda s: s["state"] == "listening", "rest")
         self.drives()
 
+    def test_wheels_that_were_blocked_drive_when_they_are_free(self):
+        self.drives_after_block("both", "wheel_blocked", "free the wheel, then arm again")
+
     def test_wheel_that_was_blocked_alone_drives_when_it_is_free(self):
-        self.rig.start_gateway()
-        self.drive_into("block left")
-        self.wait_for(lambda s: s["cause"] == "pair_diverges", "the pair diverges")
-        fix = self.next_step()
-        self.assertIn("check that the wheel turns freely and drives, then arm again", self.ctl("status")[1].replace("\n", " ") + fix)
-        self.rig.sim.ask("unblock left")
-        self.wait_for(lambda s: s["state"] == "listening", "rest")
-        self.drives()
+        self.drives_after_block("left", "pair_diverges", "check that the wheel turns freely and drives, then arm again")
 
     def doctor(self, *words):
         out = self.ctl("--json", "doctor", f"unix:{self.rig.path('bus')}", "--listen", "0.4s", *words)[1]
@@ -441,6 +419,13 @@ class Check(unittest.TestCase):
         self.rig = Rig(BUILD)
         self.addCleanup(self.rig.close)
 
+    def read_only_disk(self):
+        """The setup of a process for which the folder is one."""
+        if os.geteuid() != 0:
+            self.skipTest("needs root to mount")
+        os.mkdir(self.rig.path("disk"))
+        return read_only(self.rig.path("disk"))
+
     def check(self, *words, setup=None):
         done = subprocess.run([*self.rig.gateway_command("--check"), *words], capture_output=True, text=True, timeout=30, preexec_fn=setup, check=False)
         lines = [line.split(" ", 1) for line in done.stdout.splitlines()]
@@ -449,6 +434,12 @@ class Check(unittest.TestCase):
     def set(self, section, **keys):
         self.rig.settings.setdefault(section, {}).update(keys)
         self.rig.write_config()
+
+    def start_refused(self, about, setup=None):
+        """The start fails for the same reason."""
+        done = subprocess.run(self.rig.gateway_command(), capture_output=True, text=True, timeout=30, preexec_fn=setup, check=False)
+        self.assertEqual(69, done.returncode, done.stderr)
+        self.assertIn(about, done.stderr)
 
     def only(self, verdict, about, setup=None):
         code, found, done = self.check(setup=setup)
@@ -478,8 +469,7 @@ class Check(unittest.TestCase):
         self.assertEqual(0, self.gone("warn", "mode"))
 
     def test_record_directory_that_cannot_be_is_a_warning(self):
-        with open(self.rig.path("file"), "w", encoding="utf-8"):
-            pass
+        Path(self.rig.path("file")).touch()
         self.set("record", directory=self.rig.path("file"))
         self.assertEqual(0, self.only("warn", "Not a directory")[0])
         self.set("record", directory=self.rig.path("a/b"))
@@ -504,31 +494,14 @@ class Check(unittest.TestCase):
         os.chmod(self.rig.folder, 0o755)
         os.mkdir(self.rig.path("theirs"), 0o755)
         self.set("record", directory=self.rig.path("theirs"))
-        descriptor = os.open(program("iwheel-gateway"), os.O_RDONLY)
-        self.addCleanup(os.close, descriptor)
-
-        def check_record():
-            return subprocess.run(
-                [f"/proc/self/fd/{descriptor}", *self.rig.gateway_command("--check")[1:]],
-                text=True,
-                capture_output=True,
-                pass_fds=(descriptor,),
-                user=65534,
-                group=65534,
-                extra_groups=[],
-                check=False,
-            ).stdout
-
-        text = next(line for line in check_record().splitlines() if "record" in line)
+        command = self.rig.gateway_command("--check")
+        text = next(line for line in run_as_stranger(*command)[1].splitlines() if "record" in line)
         self.assertIn("Permission denied", text)
         subprocess.run(re.search(r"sudo (chown \d+ \S+)", text).group(1), shell=True, check=True)
-        self.assertIn("ok   record", check_record())
+        self.assertIn("ok   record", run_as_stranger(*command)[1])
 
     def test_record_directory_on_a_read_only_disk_is_a_warning(self):
-        if os.geteuid() != 0:
-            self.skipTest("needs root to mount")
-        os.mkdir(self.rig.path("disk"))
-        mount = read_only(self.rig.path("disk"))
+        mount = self.read_only_disk()
         for directory in ("disk", "disk/new"):
             self.set("record", directory=self.rig.path(directory))
             code, text = self.only("warn", "Read-only file system", setup=mount)
@@ -540,29 +513,21 @@ class Check(unittest.TestCase):
             self.rig.kill_gateway(signal.SIGTERM)
 
     def test_socket_on_a_read_only_disk_fails_as_the_start_does(self):
-        if os.geteuid() != 0:
-            self.skipTest("needs root to mount")
-        os.mkdir(self.rig.path("disk"))
-        mount = read_only(self.rig.path("disk"))
+        mount = self.read_only_disk()
         for directory in ("disk", "disk/new"):
             self.rig.socket_name = f"{directory}/gateway.sock"
             code, text = self.only("fail", "Read-only file system", setup=mount)
             self.assertEqual(1, code)
             self.assertIn("mount it for writing", text)
-            done = subprocess.run(self.rig.gateway_command(), capture_output=True, text=True, timeout=30, preexec_fn=mount, check=False)
-            self.assertEqual(69, done.returncode, done.stderr)
-            self.assertIn("Read-only file system", done.stderr)
+            self.start_refused("Read-only file system", mount)
 
     def test_socket_name_in_use_fails_as_the_start_does(self):
         os.symlink("nowhere", self.rig.path("link"))
-        with open(self.rig.path("file"), "w", encoding="utf-8"):
-            pass
+        Path(self.rig.path("file")).touch()
         for name, about in (("link", "is a symbolic link"), ("file", "exists and is not a socket")):
             self.rig.socket_name = name
             self.assertEqual(1, self.only("fail", about)[0])
-            done = subprocess.run(self.rig.gateway_command(), capture_output=True, text=True, timeout=30, check=False)
-            self.assertEqual(69, done.returncode, done.stderr)
-            self.assertIn(about, done.stderr)
+            self.start_refused(about)
             self.assertTrue(os.path.lexists(self.rig.path(name)))
 
     def test_watch_socket_that_cannot_be_is_a_warning(self):

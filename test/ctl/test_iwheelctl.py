@@ -13,7 +13,7 @@ import tempfile
 import time
 import unittest
 
-from ctl import environment, program, run
+from ctl import environment, program, run, run_as_stranger
 from fake_gateway import FakeGateway, snapshot, wheel
 from trials import until
 
@@ -79,23 +79,11 @@ class Connecting(WithGateway):
 
     @unittest.skipUnless(os.geteuid() == 0, "needs root to become another user")
     def test_permission_names_the_group_and_the_command(self):
-        # That user must be able to run the program, so it is started from an open descriptor.
         os.chmod(self.gateway.folder.name, 0o755)
         os.chmod(self.gateway.path, 0o660)
-        descriptor = os.open(PROGRAM, os.O_RDONLY)
-        self.addCleanup(os.close, descriptor)
-        done = subprocess.run(
-            [f"/proc/self/fd/{descriptor}", "--socket", self.gateway.path, "status"],
-            capture_output=True,
-            text=True,
-            pass_fds=(descriptor,),
-            user=65534,
-            group=65534,
-            extra_groups=[],
-            check=False,
-        )
-        self.assertEqual(77, done.returncode, done.stderr)
-        self.assertIn("sudo usermod -aG root", done.stderr)
+        code, _, err = run_as_stranger(PROGRAM, "--socket", self.gateway.path, "status")
+        self.assertEqual(77, code, err)
+        self.assertIn("sudo usermod -aG root", err)
 
     def test_silence_after_connecting_times_out_in_two_seconds(self):
         class NoReply(FakeGateway):

@@ -10,10 +10,9 @@ import termios
 import time
 import unittest
 
-from harness import find_program
+from ctl import program, run
 from operator_at_terminal import Operator
 
-BUILD = os.environ["IWHEEL_BUILD"]
 # Fields of `status` that each key changes, and the new values; a second press restores them.
 TOGGLES = {
     "e": lambda s: s["estop"] == "pressed",
@@ -35,17 +34,8 @@ class Keys(unittest.TestCase):
         folder = tempfile.TemporaryDirectory()
         self.addCleanup(folder.cleanup)
         self.control = os.path.join(folder.name, "control")
-        self.command = [
-            find_program(BUILD, "iwheel-sim"),
-            "--control",
-            self.control,
-            "--can",
-            f"unix:{folder.name}/bus",
-            "--estop",
-            os.path.join(folder.name, "button"),
-            "--uptime",
-            "10",
-        ]
+        bus, button = f"unix:{folder.name}/bus", os.path.join(folder.name, "button")
+        self.command = [program("iwheel-sim"), "--control", self.control, "--can", bus, "--estop", button, "--uptime", "10"]
 
     def start(self, *words):
         operator = Operator([*self.command, *words], {**os.environ, "TERM": "xterm"})
@@ -54,8 +44,7 @@ class Keys(unittest.TestCase):
         return operator
 
     def status(self):
-        answer = subprocess.run([find_program(BUILD, "iwheel-sim"), "--control", self.control, "status"], check=True, capture_output=True, text=True).stdout
-        return json.loads(answer.removeprefix("ok "))
+        return json.loads(run("--control", self.control, "status", name="iwheel-sim")[1].removeprefix("ok "))
 
     def wait_for(self, holds, what):
         end = time.monotonic() + 5

@@ -7,16 +7,14 @@ each recording; it follows from the recorded data, not from the code of learn.
 
 import itertools
 import json
-import os
 import struct
-import subprocess
 import unittest
 from dataclasses import dataclass, replace
 
 import pytest
+from ctl import run
 
 pytestmark = pytest.mark.exact
-PROGRAM = os.path.join(os.environ["IWHEEL_BUILD"], "app", "ctl", "iwheelctl")
 SIDES = ("left", "right")
 IDS = {"setpoint": ("10A", "12A"), "speed": ("100", "120"), "status": ("101", "121"), "force": ("200", "220"), "offset": ("201", "221")}
 PHASES = {"rest": 0, "forward": 400, "backward": -400}
@@ -107,8 +105,7 @@ class Story:
 
 
 def learn(story, *words):
-    done = subprocess.run([PROGRAM, *words, "learn", "-"], input=story.text(), capture_output=True, text=True, timeout=60, check=False)
-    return done.returncode, done.stdout, done.stderr
+    return run(*words, "learn", "-", input=story.text())
 
 
 def findings(story):
@@ -364,5 +361,5 @@ class AsJson(unittest.TestCase):
         self.assertEqual(None, json.loads(learn(Story(commanded=(False, True)), "--json")[1])["setpoints"]["left"]["current_mA"])
 
     def test_learn_json_without_telemetry_is_object_and_status_1(self):
-        done = subprocess.run([PROGRAM, "--json", "learn", "-"], input="(1.000000) can0 100#00000000\n", text=True, capture_output=True, check=False)
-        self.assertEqual((1, 1), (done.returncode, json.loads(done.stdout)["frames"]))
+        code, out, _ = run("--json", "learn", "-", input="(1.000000) can0 100#00000000\n")
+        self.assertEqual((1, 1), (code, json.loads(out)["frames"]))

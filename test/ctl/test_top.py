@@ -3,33 +3,31 @@
 
 import os
 import signal
-import subprocess
 import threading
 import time
 import unittest
 
+import ctl
 import pytest
 
 ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
 from fake_gateway import FakeGateway, snapshot
-from harness import Rig, find_program
+from harness import Rig
 from operator_at_terminal import Operator
 
 pyte = pytest.importorskip("pyte")  # PyPI, requirements/check.txt
 pytestmark = pytest.mark.native("processor time: virtual time needs five times as much")
-BUILD = os.environ["IWHEEL_BUILD"]
 
 
 def environment(**more):
-    clean = {key: value for key, value in os.environ.items() if key not in ("IWHEEL_SOCKET", "NO_COLOR", "LC_ALL")}
-    return {**clean, "TERM": "xterm-256color", "LANG": "C.UTF-8", **more}
+    return ctl.environment("LC_ALL", **{"TERM": "xterm-256color", "LANG": "C.UTF-8", **more})
 
 
 class Top:
     """The program on an emulated terminal."""
 
     def __init__(self, path, columns=80, rows=24, **more):
-        self.operator = Operator([find_program(BUILD, "iwheelctl"), "--socket", path, "top"], environment(**more), columns, rows)
+        self.operator = Operator([ctl.program(), "--socket", path, "top"], environment(**more), columns, rows)
         self.screen = pyte.Screen(columns, rows)
         self.stream = pyte.ByteStream(self.screen)
         self.fed = 0
@@ -75,7 +73,7 @@ class Top:
 class WithWheels(unittest.TestCase):
     def setUp(self):
         # Wheels and echoes may be late: this machine does other things too.
-        self.rig = Rig(BUILD, {"limits": {"wheel_silent_ms": 200, "echo_ms": 200}})
+        self.rig = Rig(ctl.BUILD, {"limits": {"wheel_silent_ms": 200, "echo_ms": 200}})
         self.addCleanup(self.rig.close)
         self.rig.start_gateway()
         self.drives = []
@@ -85,12 +83,14 @@ class WithWheels(unittest.TestCase):
         self.addCleanup(top.operator.close)
         return top
 
+    def full_top(self, **more):
+        """With its whole screen."""
+        top = self.top(**more)
+        top.wait_for("LEDGER")
+        return top
+
     def drive(self, left, right):
-        process = subprocess.Popen(
-            [find_program(BUILD, "iwheelctl"), "--socket", self.rig.path("gateway.sock"), "drive", str(left), str(right), "--for", "20s"],
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-        )
+        process = ctl.start("--socket", self.rig.path("gateway.sock"), "drive", str(left), str(right), "--for", "20s")
         self.addCleanup(process.wait)
         self.addCleanup(process.terminate)
         self.drives.append(process)
@@ -129,8 +129,7 @@ class WithWheels(unittest.TestCase):
         self.assertEqual(0, top.end())
 
     def test_bars_follow_the_wheels_and_space_stops_them(self):
-        top = self.top()
-        top.wait_for("LEDGER")
+        top = self.full_top()
         rows = self.see_driving(top)
         left, right = (next(row for row in rows if row.startswith(f" {name}")) for name in ("LEFT", "RIGHT"))
         self.assertIn("│███", left, rows)
@@ -164,8 +163,7 @@ class WithWheels(unittest.TestCase):
         self.assertEqual(0, top.end())
 
     def test_keys_latch_and_reset(self):
-        top = self.top()
-        top.wait_for("LEDGER")
+        top = self.full_top()
         top.press("E")
         rows = top.wait_for("estop software")
         self.assertEqual(" #      ###  ##### ", top.blocks(1)[:19])  # L A T
@@ -182,8 +180,7 @@ class WithWheels(unittest.TestCase):
         self.assertEqual(0, top.end())
 
     def test_every_size_shows_the_state_and_resizing_does_no_harm(self):
-        top = self.top()
-        top.wait_for("LEDGER")
+        top = self.full_top()
         for columns, rows in ((60, 24), (40, 12), (20, 4), (10, 2), (200, 60), (30, 24), (80, 10), (80, 24)):
             top.resize(columns, rows)
             screen = top.screen_after(0.5)
@@ -273,8 +270,7 @@ class WithWheels(unittest.TestCase):
         self.assertEqual(0, top.end())
 
     def test_it_waits_for_a_gateway_that_went_and_comes(self):
-        top = self.top()
-        top.wait_for("LEDGER")
+        top = self.full_top()
         self.rig.kill_gateway(signal.SIGKILL)
         top.wait_for("waiting for a gateway")
         rows = top.screen_after(0.3)
@@ -294,8 +290,7 @@ class WithWheels(unittest.TestCase):
         self.assertEqual(0, top.end())
 
     def test_lost_wheel_is_marked_and_unknown_values_are_dashes(self):
-        top = self.top()
-        top.wait_for("LEDGER")
+        top = self.full_top()
         self.rig.sim.ask("mute right")
         top.wait_for("LOST")
         rows = top.screen_after(0.5)
@@ -305,8 +300,7 @@ class WithWheels(unittest.TestCase):
 
     def test_without_colours_there_are_none_but_emphasis(self):
         for more in ({"NO_COLOR": "1"}, {"TERM": "vt100"}):
-            top = self.top(**more)
-            top.wait_for("LEDGER")
+            top = self.full_top(**more)
             raw = top.operator.raw
             self.assertNotRegex(raw, rb"\x1b\[[0-9;]*3[0-7]m", more)
             self.assertIn("#", top.blocks(1))
@@ -319,14 +313,18 @@ class WithWheels(unittest.TestCase):
         self.assertEqual(0, top.end())
 
     def test_signal_leaves_the_terminal_in_order(self):
-        top = self.top()
-        top.wait_for("LEDGER")
+        top = self.full_top()
         top.operator.process.send_signal(signal.SIGTERM)
         self.assertEqual(0, top.operator.wait())
         self.assertIn(b"\x1b[?1049l", top.operator.raw)
 
 
 class WithoutWheels(unittest.TestCase):
+    def operator(self, words, columns=80, **more):
+        operator = Operator([ctl.program(), *words], environment(**more), columns)
+        self.addCleanup(operator.close)
+        return operator
+
     def test_no_gateway_is_waited_for_with_the_reason(self):
         top = Top("/nonexistent/gateway.sock")
         self.addCleanup(top.operator.close)
@@ -371,19 +369,15 @@ class WithoutWheels(unittest.TestCase):
         self.assertEqual(0, top.end())
 
     def test_not_a_terminal_and_an_unknown_one_are_usage(self):
-        done = subprocess.run(
-            [find_program(BUILD, "iwheelctl"), "top"], stdin=subprocess.DEVNULL, capture_output=True, text=True, env=environment(), check=False
-        )
-        self.assertEqual(64, done.returncode)
-        self.assertIn("iwheelctl status", done.stderr)
-        operator = Operator([find_program(BUILD, "iwheelctl"), "top"], environment(TERM="no-such-thing"))
-        self.addCleanup(operator.close)
+        code, _, err = ctl.run("top", env=environment())
+        self.assertEqual(64, code)
+        self.assertIn("iwheelctl status", err)
+        operator = self.operator(["top"], TERM="no-such-thing")
         operator.expect("this terminal cannot draw")
         self.assertEqual(64, operator.wait())
 
     def test_top_on_dumb_terminal_names_another_verb_and_ends(self):
-        operator = Operator([find_program(BUILD, "iwheelctl"), "--socket", "/nonexistent", "top"], environment(TERM="dumb"))
-        self.addCleanup(operator.close)
+        operator = self.operator(["--socket", "/nonexistent", "top"], TERM="dumb")
         operator.expect("(TERM=dumb); without drawing: iwheelctl status, or iwheelctl watch")
         self.assertEqual(64, operator.wait())
         self.assertNotIn(b"\x1b", operator.raw)
@@ -392,10 +386,7 @@ class WithoutWheels(unittest.TestCase):
         for more, columns in (({"TERM": "dumb"}, 80), ({}, 40)):
             gateway = FakeGateway()
             self.addCleanup(gateway.close)
-            operator = Operator(
-                [find_program(BUILD, "iwheelctl"), "--socket", gateway.path, "drive", "200", "200", "--for", "300ms"], environment(**more), columns
-            )
-            self.addCleanup(operator.close)
+            operator = self.operator(["--socket", gateway.path, "drive", "200", "200", "--for", "300ms"], columns, **more)
             self.assertEqual(0, operator.wait(), operator.text)
             if more:
                 self.assertNotIn(b"\x1b", operator.raw)
