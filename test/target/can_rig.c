@@ -150,20 +150,31 @@ void rig_init(int device, bool silent) {
 void rig_start(int device) {
     rig_init(device, false);
     (void)can_bus_state(&rig[device].driver);
-    can_model_recessive(&rig[device].model, 11);
+    rig_assert_active_after(device, 11);
+}
+
+void rig_assert_active_after(int device, uint32_t bits) {
+    can_model_recessive(&rig[device].model, bits);
     TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, can_bus_state(&rig[device].driver));
 }
 
-bool rig_send_next(int device, model_frame_t *out_frame) {
-    can_model_t *const model = &rig[device].model;
-    const int mailbox = can_model_offer(model, out_frame);
+bool rig_attempt_next(int device, model_end_t end, model_frame_t *out_frame) {
+    can_model_t *const its = &rig[device].model;
+    const int mailbox = can_model_offer(its, out_frame);
     if (mailbox == MODEL_NONE) {
         return false;
     }
-    can_model_begin(model, mailbox);
-    can_model_end(model, mailbox, MODEL_SENT);
-    serve(&rig[device]);
+    can_model_begin(its, mailbox);
+    can_model_end(its, mailbox, end);
     return true;
+}
+
+bool rig_send_next(int device, model_frame_t *out_frame) {
+    const bool was_sent = rig_attempt_next(device, MODEL_SENT, out_frame);
+    if (was_sent) {
+        serve(&rig[device]);
+    }
+    return was_sent;
 }
 
 void rig_serve(int device) {
@@ -209,7 +220,64 @@ iw_can_frame_t rig_frame(uint32_t id, uint8_t mark) {
     return (iw_can_frame_t){.id = id, .dlc = 5, .data = {mark, 0x11, 0x22, 0x33, 0x44}};
 }
 
-void rig_assert_no_violation(void) {
+int rig_send(uint32_t id, uint8_t mark) {
+    const iw_can_frame_t frame = rig_frame(id, mark);
+    return can_send(driver, &frame, 1);
+}
+
+void rig_assert_on_bus(uint32_t id, uint8_t mark) {
+    model_frame_t frame;
+    TEST_ASSERT_TRUE_MESSAGE(rig_send_next(0, &frame), "nothing waits to be sent");
+    TEST_ASSERT_EQUAL(id, frame.id);
+    TEST_ASSERT_EQUAL(mark, frame.data[0]);
+}
+
+void rig_assert_nothing_waits(void) {
+    model_frame_t frame;
+    TEST_ASSERT_FALSE(rig_send_next(0, &frame));
+}
+
+void rig_assert_echo(uint32_t id, uint8_t mark) {
+    iw_can_frame_t echo;
+    TEST_ASSERT_EQUAL_MESSAGE(1, can_receive(driver, &echo), "no echo");
+    TEST_ASSERT_EQUAL(IW_CAN_ECHO, echo.kind);
+    TEST_ASSERT_EQUAL(id, echo.id);
+    TEST_ASSERT_EQUAL(mark, echo.data[0]);
+}
+
+void rig_assert_no_echo(void) {
+    iw_can_frame_t echo;
+    TEST_ASSERT_EQUAL(0, can_receive(driver, &echo));
+}
+
+void rig_assert_loss_reported(void) {
+    iw_can_frame_t received;
+    memset(&received, 0xA5, sizeof received);
+    TEST_ASSERT_EQUAL(1, can_receive(driver, &received));
+    TEST_ASSERT_EQUAL_HEX32(IW_CAN_ERROR, received.id);
+    TEST_ASSERT_EQUAL(IW_CAN_RECEIVED, received.kind);
+    TEST_ASSERT_EQUAL(0, received.dlc);
+}
+
+void rig_hear_burst(uint32_t count) {
+    for (uint32_t i = 0; i < count; i++) {
+        const model_frame_t frame = {.id = 256, .dlc = 1, .data = {(uint8_t)i}};
+        (void)can_model_receive(model, &frame);
+    }
+    serve(&rig[0]);
+}
+
+void rig_assert_received(uint32_t count) {
+    iw_can_frame_t received;
+    for (uint32_t i = 0; i < count; i++) {
+        TEST_ASSERT_EQUAL(1, can_receive(driver, &received));
+        TEST_ASSERT_EQUAL(256, received.id);
+        TEST_ASSERT_EQUAL(i, received.data[0]);
+    }
+    TEST_ASSERT_EQUAL(0, can_receive(driver, &received));
+}
+
+void tearDown(void) {
     for (int i = 0; i < RIG_DEVICES; i++) {
         TEST_ASSERT_EQUAL_STRING("", can_model_violation(&rig[i].model));
     }

@@ -2,6 +2,8 @@
 /// A driver on two modelled controllers, with a bus between the test and the model. The same tests judge the drivers of bxCAN and of
 /// FDCAN (IWHEEL_RIG_FDCAN), so this file names both alike.
 ///
+/// After each test, no model may have seen something that the manual forbids.
+///
 /// Interrupts are as rude as those of the hardware: while a line is up and no handler runs, an interrupt strikes right after any access to
 /// a register.
 #ifndef CAN_RIG_H
@@ -110,6 +112,10 @@ typedef struct {
 
 extern rig_device_t rig[RIG_DEVICES];
 
+/// Those of device 0, the only one in most tests.
+static can_driver_t *const driver = &rig[0].driver;
+static can_model_t *const model = &rig[0].model;
+
 /// Both models reset, both drivers poisoned and not initialised, no hook; bxCAN: device 0 holds the filters of both.
 void rig_reset(void);
 
@@ -118,6 +124,12 @@ void rig_init(int device, bool silent);
 
 /// Initialises the driver and brings it to RUNNING with a quiet bus. Fails the test if it does not get there.
 void rig_start(int device);
+
+/// The bus is recessive for that many bits. Fails the test if the device does not take part in the bus then.
+void rig_assert_active_after(int device, uint32_t bits);
+
+/// Plays one attempt to send the next frame, and serves no interrupt. Returns true and writes the frame if the device had one to send.
+bool rig_attempt_next(int device, model_end_t end, model_frame_t *out_frame);
 
 /// Plays a whole frame with arbitration won and an acknowledgement. Returns true and writes the frame if the device had one to send.
 bool rig_send_next(int device, model_frame_t *out_frame);
@@ -131,14 +143,33 @@ void rig_serve(int device);
 /// A setpoint-like frame: `mark` is its first byte.
 iw_can_frame_t rig_frame(uint32_t id, uint8_t mark);
 
+/// Gives such a frame to the driver of device 0, and returns the driver's result.
+int rig_send(uint32_t id, uint8_t mark);
+
+/// Device 0 sends its next frame, and it is this one.
+void rig_assert_on_bus(uint32_t id, uint8_t mark);
+
+/// Device 0 has no frame to send.
+void rig_assert_nothing_waits(void);
+
+/// The next frame that driver 0 delivers is the echo of this one, or there is no next frame.
+void rig_assert_echo(uint32_t id, uint8_t mark);
+void rig_assert_no_echo(void);
+
+/// The next frame that driver 0 delivers reports that frames were lost.
+void rig_assert_loss_reported(void);
+
+/// Another node sends that many frames to device 0, and interrupts are served after the last one. Their first bytes count from 0.
+void rig_hear_burst(uint32_t count);
+
+/// Driver 0 delivers that many of these frames, the first ones, and no other frame.
+void rig_assert_received(uint32_t count);
+
 /// Read the error counters. The receive counter of FDCAN has no value beyond 128.
 uint32_t rig_read_tec(int device);
 uint32_t rig_read_rec(int device);
 
 /// Fails the test if the last error code is another one. FDCAN: no check, because a read of it clears it.
 void rig_assert_lec(int device, uint32_t code);
-
-/// Fails the test if a model saw something that the manual forbids.
-void rig_assert_no_violation(void);
 
 #endif

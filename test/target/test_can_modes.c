@@ -3,18 +3,8 @@
 #include "can_rig.h"
 #include "unit.h"
 
-static can_driver_t *const driver = &rig[0].driver;
-static can_model_t *const model = &rig[0].model;
-
-void setUp(void);
-void tearDown(void);
-
 void setUp(void) {
     rig_reset();
-}
-
-void tearDown(void) {
-    rig_assert_no_violation();
 }
 
 static iw_bus_state_t state(void) {
@@ -26,8 +16,7 @@ TEST(test_bus_is_down_until_11_recessive_bits) {
     TEST_ASSERT_EQUAL(IW_BUS_DOWN, state());
     can_model_recessive(model, 10);
     TEST_ASSERT_EQUAL(IW_BUS_DOWN, state());
-    can_model_recessive(model, 1);
-    TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, state());
+    rig_assert_active_after(0, 1);
     TEST_ASSERT_TRUE(can_model_is_on(model));
 }
 
@@ -43,8 +32,7 @@ TEST(test_bus_dominant_at_start_is_polled_without_blocking) {
         can_model_dominant(model);
         TEST_ASSERT_EQUAL(IW_BUS_DOWN, state());
     }
-    can_model_recessive(model, 11);
-    TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, state());
+    rig_assert_active_after(0, 11);
 }
 
 TEST(test_bus_controller_without_a_reply_is_down_and_recovers) {
@@ -57,8 +45,7 @@ TEST(test_bus_controller_without_a_reply_is_down_and_recovers) {
     (void)state();
     can_model_recessive(model, 11);
     (void)state();
-    can_model_recessive(model, 11);
-    TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, state());
+    rig_assert_active_after(0, 11);
 }
 
 TEST(test_bus_unexpected_reset_is_reported_and_repaired) {
@@ -66,8 +53,7 @@ TEST(test_bus_unexpected_reset_is_reported_and_repaired) {
     can_model_reset(model, 28);
     TEST_ASSERT_EQUAL(IW_BUS_DOWN, state());
     (void)state();
-    can_model_recessive(model, 11);
-    TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, state());
+    rig_assert_active_after(0, 11);
     TEST_ASSERT_EQUAL_HEX32(RIG_TIMING, can_model_read(model, RIG_TIMING_REGISTER));
 }
 
@@ -78,8 +64,7 @@ TEST(test_bus_unexpected_reset_while_joining_is_repaired) {
     for (int i = 0; i < 3; i++) {
         TEST_ASSERT_EQUAL(IW_BUS_DOWN, state());
     }
-    can_model_recessive(model, 11);
-    TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, state());
+    rig_assert_active_after(0, 11);
 }
 
 TEST(test_bus_lost_request_is_repeated) {
@@ -90,8 +75,7 @@ TEST(test_bus_lost_request_is_repeated) {
     for (int i = 0; i < 3; i++) {
         TEST_ASSERT_EQUAL(IW_BUS_DOWN, state());
     }
-    can_model_recessive(model, 11);
-    TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, state());
+    rig_assert_active_after(0, 11);
 }
 
 TEST(test_bus_unexpected_initialisation_mode_is_left) {
@@ -99,20 +83,17 @@ TEST(test_bus_unexpected_initialisation_mode_is_left) {
     can_model_write(model, RIG_MODE_REGISTER, RIG_MODE_INIT);
     TEST_ASSERT_EQUAL(IW_BUS_DOWN, state());
     (void)state();
-    can_model_recessive(model, 11);
-    TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, state());
+    rig_assert_active_after(0, 11);
 }
 
 TEST(test_bus_silent_device_only_receives) {
-    const iw_can_frame_t frame = rig_frame(266, 1);
     iw_can_frame_t first_frame;
     rig_init(0, true);
     (void)state();
-    can_model_recessive(model, 11);
-    TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, state());
+    rig_assert_active_after(0, 11);
     TEST_ASSERT_FALSE(rig_hear(0, 256, 4));
     TEST_ASSERT_EQUAL(1, can_receive(driver, &first_frame));
-    TEST_ASSERT_LESS_THAN(0, can_send(driver, &frame, 1));
+    TEST_ASSERT_LESS_THAN(0, rig_send(266, 1));
 }
 
 TEST(test_bus_device_that_is_not_silent_acknowledges) {
@@ -123,56 +104,46 @@ TEST(test_bus_device_that_is_not_silent_acknowledges) {
 static void fail_until_bus_off(void) {
     model_frame_t frame;
     int tries = 0;
-    for (int mailbox = can_model_offer(model, &frame); mailbox != MODEL_NONE;
-         mailbox = can_model_offer(model, &frame)) {
-        can_model_begin(model, mailbox);
-        can_model_end(model, mailbox, MODEL_BIT_ERROR);
+    while (rig_attempt_next(0, MODEL_BIT_ERROR, &frame)) {
         TEST_ASSERT_LESS_THAN(33, tries++);
     }
     TEST_ASSERT_TRUE(model->bus_off);
 }
 
-TEST(test_bus_off_is_left_after_the_recovery_sequence) {
-    const iw_can_frame_t frame = rig_frame(266, 1);
+/// The frame is still waiting in bus-off.
+static void start_and_fail_with_a_frame(void) {
     rig_start(0);
-    (void)can_send(driver, &frame, 1);
+    (void)rig_send(266, 1);
     fail_until_bus_off();
+}
+
+TEST(test_bus_off_is_left_after_the_recovery_sequence) {
+    start_and_fail_with_a_frame();
     TEST_ASSERT_EQUAL(IW_BUS_OFF, state());
-    TEST_ASSERT_LESS_THAN(0, can_send(driver, &frame, 1));
+    TEST_ASSERT_LESS_THAN(0, rig_send(266, 1));
     TEST_ASSERT_EQUAL(IW_BUS_OFF, state());
     can_model_recessive(model, RIG_REJOIN_BITS - 1U);
     TEST_ASSERT_EQUAL(IW_BUS_OFF, state());
-    can_model_recessive(model, 1);
-    TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, state());
+    rig_assert_active_after(0, 1);
     TEST_ASSERT_EQUAL(1, driver->bus_offs);
 }
 
 TEST(test_bus_off_is_not_left_by_the_controller_alone) {
-    const iw_can_frame_t frame = rig_frame(266, 1);
-    rig_start(0);
-    (void)can_send(driver, &frame, 1);
-    fail_until_bus_off();
+    start_and_fail_with_a_frame();
     can_model_recessive(model, 100U * RIG_REJOIN_BITS);
     TEST_ASSERT_TRUE(model->bus_off);
     TEST_ASSERT_EQUAL(IW_BUS_OFF, state());
 }
 
 TEST(test_bus_send_fails_in_bus_off_before_its_report) {
-    const iw_can_frame_t frame = rig_frame(266, 1);
-    rig_start(0);
-    (void)can_send(driver, &frame, 1);
-    fail_until_bus_off();
-    TEST_ASSERT_LESS_THAN(0, can_send(driver, &frame, 1));
+    start_and_fail_with_a_frame();
+    TEST_ASSERT_LESS_THAN(0, rig_send(266, 1));
 }
 
 TEST(test_bus_frame_from_before_bus_off_is_not_sent_after_it) {
-    const iw_can_frame_t left = rig_frame(266, 1);
-    const iw_can_frame_t right = rig_frame(298, 1);
-    model_frame_t frame;
-    iw_can_frame_t echo;
     rig_start(0);
-    (void)can_send(driver, &left, 1);
-    (void)can_send(driver, &right, 1);
+    (void)rig_send(266, 1);
+    (void)rig_send(298, 1);
     fail_until_bus_off();
     TEST_ASSERT_EQUAL(IW_BUS_OFF, state());
     for (int i = 0; i < MODEL_MAILBOXES; i++) {
@@ -180,18 +151,14 @@ TEST(test_bus_frame_from_before_bus_off_is_not_sent_after_it) {
     }
     (void)state();
     (void)state();
-    can_model_recessive(model, RIG_REJOIN_BITS);
-    TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, state());
-    TEST_ASSERT_FALSE(rig_send_next(0, &frame));
-    TEST_ASSERT_EQUAL(0, can_receive(driver, &echo));
+    rig_assert_active_after(0, RIG_REJOIN_BITS);
+    rig_assert_nothing_waits();
+    rig_assert_no_echo();
 }
 
 #ifndef IWHEEL_RIG_FDCAN
 TEST(test_bus_recovery_waits_for_the_abort_of_waiting_frames) {
-    const iw_can_frame_t frame = rig_frame(266, 1);
-    rig_start(0);
-    (void)can_send(driver, &frame, 1);
-    fail_until_bus_off();
+    start_and_fail_with_a_frame();
     model->abort_reads = 5000;
     for (int i = 0; i < 3; i++) {
         TEST_ASSERT_EQUAL(IW_BUS_OFF, state());
@@ -201,38 +168,28 @@ TEST(test_bus_recovery_waits_for_the_abort_of_waiting_frames) {
     for (int i = 0; i < 4; i++) {
         TEST_ASSERT_EQUAL(IW_BUS_OFF, state());
     }
-    can_model_recessive(model, RIG_REJOIN_BITS);
-    TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, state());
+    rig_assert_active_after(0, RIG_REJOIN_BITS);
 }
 #endif
 
 TEST(test_bus_purge_pending_in_bus_off_ends_in_the_recovery) {
-    const iw_can_frame_t frame = rig_frame(266, 1);
-    model_frame_t on_bus;
-    rig_start(0);
-    (void)can_send(driver, &frame, 1);
-    fail_until_bus_off();
+    start_and_fail_with_a_frame();
     model->abort_reads = 2000;
     TEST_ASSERT_EQUAL(0, can_purge(driver));
     TEST_ASSERT_EQUAL(0, driver->resets);
     for (int i = 0; i < 4; i++) {
         TEST_ASSERT_EQUAL(IW_BUS_OFF, state());
     }
-    can_model_recessive(model, RIG_REJOIN_BITS);
-    TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, state());
-    TEST_ASSERT_EQUAL(MODEL_NONE, can_model_offer(model, &on_bus));
+    rig_assert_active_after(0, RIG_REJOIN_BITS);
+    rig_assert_nothing_waits();
 }
 
 TEST(test_bus_error_passive_is_reported) {
-    const iw_can_frame_t frame = rig_frame(266, 1);
     model_frame_t on_bus;
     rig_start(0);
-    (void)can_send(driver, &frame, 1);
+    (void)rig_send(266, 1);
     for (int i = 0; i < 100; i++) { // Without an acknowledgement the device becomes error passive, but never bus-off.
-        const int mailbox = can_model_offer(model, &on_bus);
-        TEST_ASSERT_NOT_EQUAL(MODEL_NONE, mailbox);
-        can_model_begin(model, mailbox);
-        can_model_end(model, mailbox, MODEL_NO_ACKNOWLEDGEMENT);
+        TEST_ASSERT_TRUE(rig_attempt_next(0, MODEL_NO_ACKNOWLEDGEMENT, &on_bus));
     }
     TEST_ASSERT_EQUAL(IW_BUS_PASSIVE, state());
     TEST_ASSERT_EQUAL(128, rig_read_tec(0));
@@ -279,11 +236,10 @@ TEST(test_bus_two_devices_share_only_their_filters) {
 }
 
 static bool in_use_reads_back(uint32_t id) {
-    const iw_can_frame_t frame = rig_frame(id, 5);
     model_frame_t on_bus;
     iw_can_frame_t echo;
-    return can_send(driver, &frame, 1) > 0 && rig_send_next(0, &on_bus) && can_receive(driver, &echo) > 0 &&
-           echo.id == id && echo.kind == IW_CAN_ECHO;
+    return rig_send(id, 5) > 0 && rig_send_next(0, &on_bus) && can_receive(driver, &echo) > 0 && echo.id == id &&
+           echo.kind == IW_CAN_ECHO;
 }
 
 TEST(test_bus_off_of_one_device_does_not_affect_the_other) {
@@ -295,9 +251,7 @@ TEST(test_bus_off_of_one_device_does_not_affect_the_other) {
     rig_start(1);
     TEST_ASSERT_EQUAL(1, can_send(other, &frame, 1));
     while (can_model_is_on(&rig[1].model)) {
-        const int mailbox = can_model_offer(&rig[1].model, &on_bus);
-        can_model_begin(&rig[1].model, mailbox);
-        can_model_end(&rig[1].model, mailbox, MODEL_BIT_ERROR);
+        (void)rig_attempt_next(1, MODEL_BIT_ERROR, &on_bus);
     }
     TEST_ASSERT_EQUAL(IW_BUS_OFF, can_bus_state(other));
     TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, state());
@@ -308,28 +262,24 @@ TEST(test_bus_off_of_one_device_does_not_affect_the_other) {
     TEST_ASSERT_EQUAL(1, other->bus_offs);
     (void)can_bus_state(other);
     (void)can_bus_state(other);
-    can_model_recessive(&rig[1].model, RIG_REJOIN_BITS);
-    TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, can_bus_state(other));
+    rig_assert_active_after(1, RIG_REJOIN_BITS);
     TEST_ASSERT_EQUAL(1, can_purge(other));
     TEST_ASSERT_TRUE(in_use_reads_back(298));
 }
 
 TEST(test_bus_dominant_within_our_frame_is_bus_off) {
-    const iw_can_frame_t frame = rig_frame(266, 1);
     model_frame_t on_bus;
     rig_start(0);
-    (void)can_send(driver, &frame, 1);
-    can_model_begin(model, can_model_offer(model, &on_bus));
-    can_model_end(model, 0, MODEL_BIT_ERROR);
+    (void)rig_send(266, 1);
+    (void)rig_attempt_next(0, MODEL_BIT_ERROR, &on_bus);
     can_model_hold(model, 300, true);
     TEST_ASSERT_EQUAL(IW_BUS_OFF, state());
     for (int i = 0; i < 100; i++) {
         can_model_hold(model, 1000, true);
         TEST_ASSERT_EQUAL(IW_BUS_OFF, state());
     }
-    can_model_recessive(model, RIG_REJOIN_BITS);
-    TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, state());
-    TEST_ASSERT_EQUAL(MODEL_NONE, can_model_offer(model, &on_bus));
+    rig_assert_active_after(0, RIG_REJOIN_BITS);
+    rig_assert_nothing_waits();
 }
 
 TEST(test_bus_dominant_while_listening_is_passive_only) {

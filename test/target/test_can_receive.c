@@ -6,20 +6,11 @@
 
 #include <string.h>
 
-static can_driver_t *const driver = &rig[0].driver;
-static can_model_t *const model = &rig[0].model;
 static const uint32_t ours[] = {256, 257, 266, 288, 289, 290, 298, 512, 513, 544, 545};
-
-void setUp(void);
-void tearDown(void);
 
 void setUp(void) {
     rig_reset();
     rig_start(0);
-}
-
-void tearDown(void) {
-    rig_assert_no_violation();
 }
 
 static bool is_ours(uint32_t id) {
@@ -117,41 +108,14 @@ TEST(test_received_foreign_setpoint_is_no_echo) {
 
 #ifndef IWHEEL_RIG_FDCAN
 TEST(test_received_frame_with_a_slow_release_is_not_doubled) {
-    iw_can_frame_t received;
     model->release_slow = 4;
-    for (uint8_t i = 0; i < 3; i++) {
-        const model_frame_t frame = {.id = 256, .dlc = 1, .data = {i}};
-        (void)can_model_receive(model, &frame);
-    }
-    rig_serve(0);
-    for (uint8_t i = 0; i < 3; i++) {
-        TEST_ASSERT_EQUAL(1, can_receive(driver, &received));
-        TEST_ASSERT_EQUAL(i, received.data[0]);
-    }
-    TEST_ASSERT_EQUAL(0, can_receive(driver, &received));
+    rig_hear_burst(3);
+    rig_assert_received(3);
 }
 #endif
 
-static void assert_loss_reported(void) {
-    iw_can_frame_t received;
-    memset(&received, 0xA5, sizeof received);
-    TEST_ASSERT_EQUAL(1, can_receive(driver, &received));
-    TEST_ASSERT_EQUAL_HEX32(IW_CAN_ERROR, received.id);
-    TEST_ASSERT_EQUAL(IW_CAN_RECEIVED, received.kind);
-    TEST_ASSERT_EQUAL(0, received.dlc);
-}
-
-/// Interrupts are disabled for five frames.
-static void overrun(void) {
-    const model_frame_t frame = {.id = 256, .dlc = 4};
-    for (int i = 0; i < 5; i++) {
-        (void)can_model_receive(model, &frame);
-    }
-    rig_serve(0);
-}
-
 TEST(test_overrun_of_the_controller_is_counted_once) {
-    overrun();
+    rig_hear_burst(5);
     TEST_ASSERT_EQUAL(1, driver->overruns);
     (void)rig_hear(0, 256, 4);
     TEST_ASSERT_EQUAL(1, driver->overruns);
@@ -160,8 +124,8 @@ TEST(test_overrun_of_the_controller_is_counted_once) {
 TEST(test_overrun_is_reported_once_and_before_its_frames) {
     iw_can_frame_t received;
     for (int round = 0; round < 2; round++) {
-        overrun();
-        assert_loss_reported();
+        rig_hear_burst(5);
+        rig_assert_loss_reported();
         for (int i = 0; i < 3; i++) {
             TEST_ASSERT_EQUAL(1, can_receive(driver, &received));
             TEST_ASSERT_EQUAL(256, received.id);
@@ -178,12 +142,8 @@ TEST(test_full_ring_drops_and_counts_the_newest) {
         rig_serve(0);
     }
     TEST_ASSERT_EQUAL(5, driver->lost);
-    assert_loss_reported();
-    for (uint32_t i = 0; i < BRD_FRAME_RING_LENGTH; i++) {
-        TEST_ASSERT_EQUAL(1, can_receive(driver, &received));
-        TEST_ASSERT_EQUAL(i, received.data[0]);
-    }
-    TEST_ASSERT_EQUAL(0, can_receive(driver, &received));
+    rig_assert_loss_reported();
+    rig_assert_received(BRD_FRAME_RING_LENGTH);
     (void)rig_hear(0, 257, 7);
     TEST_ASSERT_EQUAL(1, can_receive(driver, &received));
 }

@@ -3,49 +3,9 @@
 #include "can_rig.h"
 #include "unit.h"
 
-static can_driver_t *const driver = &rig[0].driver;
-static can_model_t *const model = &rig[0].model;
-
-void setUp(void);
-void tearDown(void);
-
 void setUp(void) {
     rig_reset();
     rig_start(0);
-}
-
-void tearDown(void) {
-    rig_assert_no_violation();
-}
-
-static int send(uint32_t id, uint8_t mark) {
-    const iw_can_frame_t frame = rig_frame(id, mark);
-    return can_send(driver, &frame, 1);
-}
-
-static void assert_on_bus(uint32_t id, uint8_t mark) {
-    model_frame_t frame;
-    TEST_ASSERT_TRUE_MESSAGE(rig_send_next(0, &frame), "nothing waits to be sent");
-    TEST_ASSERT_EQUAL(id, frame.id);
-    TEST_ASSERT_EQUAL(mark, frame.data[0]);
-}
-
-static void assert_nothing_waits(void) {
-    model_frame_t frame;
-    TEST_ASSERT_FALSE(rig_send_next(0, &frame));
-}
-
-static void assert_echo(uint32_t id, uint8_t mark) {
-    iw_can_frame_t echo;
-    TEST_ASSERT_EQUAL_MESSAGE(1, can_receive(driver, &echo), "no echo");
-    TEST_ASSERT_EQUAL(IW_CAN_ECHO, echo.kind);
-    TEST_ASSERT_EQUAL(id, echo.id);
-    TEST_ASSERT_EQUAL(mark, echo.data[0]);
-}
-
-static void assert_no_echo(void) {
-    iw_can_frame_t echo;
-    TEST_ASSERT_EQUAL(0, can_receive(driver, &echo));
 }
 
 TEST(test_sent_frame_has_the_same_bytes) {
@@ -85,31 +45,29 @@ TEST(test_send_of_other_than_a_standard_data_frame_is_refused) {
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
         TEST_ASSERT_LESS_THAN(0, can_send(driver, &wrong[i], 1));
     }
-    assert_nothing_waits();
+    rig_assert_nothing_waits();
 }
 
 TEST(test_echo_is_created_only_by_the_acknowledgement) {
     model_frame_t frame;
-    TEST_ASSERT_EQUAL(1, send(266, 1));
-    assert_no_echo();
+    TEST_ASSERT_EQUAL(1, rig_send(266, 1));
+    rig_assert_no_echo();
     for (int i = 0; i < 50; i++) {
-        const int mailbox = can_model_offer(model, &frame);
-        can_model_begin(model, mailbox);
-        can_model_end(model, mailbox, (i % 2 == 0) ? MODEL_NO_ACKNOWLEDGEMENT : MODEL_LOST_ARBITRATION);
-        assert_no_echo();
+        (void)rig_attempt_next(0, (i % 2 == 0) ? MODEL_NO_ACKNOWLEDGEMENT : MODEL_LOST_ARBITRATION, &frame);
+        rig_assert_no_echo();
     }
-    assert_on_bus(266, 1);
-    assert_echo(266, 1);
-    assert_no_echo();
+    rig_assert_on_bus(266, 1);
+    rig_assert_echo(266, 1);
+    rig_assert_no_echo();
 }
 
 TEST(test_left_frame_is_sent_before_the_right_in_any_order) {
-    (void)send(298, 2);
-    (void)send(266, 1);
-    assert_on_bus(266, 1);
-    assert_on_bus(298, 2);
-    assert_echo(266, 1);
-    assert_echo(298, 2);
+    (void)rig_send(298, 2);
+    (void)rig_send(266, 1);
+    rig_assert_on_bus(266, 1);
+    rig_assert_on_bus(298, 2);
+    rig_assert_echo(266, 1);
+    rig_assert_echo(298, 2);
 }
 
 /// Bytes and id of every mailbox are written before the first one is requested: the mailbox of the left frame is not
@@ -137,26 +95,26 @@ TEST(test_pair_fills_both_mailboxes_before_it_requests_one) {
     for (uint32_t i = 0; i < writes; i++) {
         TEST_ASSERT_EQUAL_MESSAGE(i >= writes - RIG_REQUESTS, RIG_IS_REQUEST(written[i]), "requests come last");
     }
-    assert_on_bus(266, 1);
-    assert_on_bus(298, 2);
-    assert_nothing_waits();
-    assert_echo(266, 1);
-    assert_echo(298, 2);
-    assert_no_echo();
+    rig_assert_on_bus(266, 1);
+    rig_assert_on_bus(298, 2);
+    rig_assert_nothing_waits();
+    rig_assert_echo(266, 1);
+    rig_assert_echo(298, 2);
+    rig_assert_no_echo();
 }
 
 TEST(test_pair_replaces_the_waiting_pair) {
     TEST_ASSERT_EQUAL(2, send_pair(1, 2));
     TEST_ASSERT_EQUAL(2, send_pair(3, 4));
     TEST_ASSERT_EQUAL(0, send_pair(5, 6));
-    assert_on_bus(266, 3);
-    assert_on_bus(298, 4);
-    assert_nothing_waits();
-    assert_echo(266, 1);
-    assert_echo(266, 3);
-    assert_echo(298, 2);
-    assert_echo(298, 4);
-    assert_no_echo();
+    rig_assert_on_bus(266, 3);
+    rig_assert_on_bus(298, 4);
+    rig_assert_nothing_waits();
+    rig_assert_echo(266, 1);
+    rig_assert_echo(266, 3);
+    rig_assert_echo(298, 2);
+    rig_assert_echo(298, 4);
+    rig_assert_no_echo();
 }
 
 TEST(test_pair_with_a_wrong_frame_is_refused_completely) {
@@ -164,28 +122,24 @@ TEST(test_pair_with_a_wrong_frame_is_refused_completely) {
     const iw_can_frame_t right_wrong[] = {rig_frame(266, 1), rig_frame(0x800, 2)};
     TEST_ASSERT_LESS_THAN(0, can_send(driver, left_wrong, 2));
     TEST_ASSERT_LESS_THAN(0, can_send(driver, right_wrong, 2));
-    assert_nothing_waits();
-    assert_no_echo();
+    rig_assert_nothing_waits();
+    rig_assert_no_echo();
 }
 
 TEST(test_pair_without_a_place_for_right_accepts_left_only) {
-    const iw_can_frame_t right = rig_frame(298, 2);
-    (void)send(298, 1);
-    (void)can_send(driver, &right, 1);
+    (void)rig_send(298, 1);
+    (void)rig_send(298, 2);
     TEST_ASSERT_EQUAL(1, send_pair(3, 4));
-    assert_on_bus(266, 3);
-    assert_on_bus(298, 2);
-    assert_nothing_waits();
-    assert_echo(266, 3);
+    rig_assert_on_bus(266, 3);
+    rig_assert_on_bus(298, 2);
+    rig_assert_nothing_waits();
+    rig_assert_echo(266, 3);
 }
 
 /// All waiting frames are sent when the interrupt has just been masked: the abort is too late.
 static bool send_all_at_masking(uint32_t offset) {
     model_frame_t frame;
-    for (int i = can_model_offer(model, &frame); offset == RIG_MASK_REGISTER && i >= 0;
-         i = can_model_offer(model, &frame)) {
-        can_model_begin(model, i);
-        can_model_end(model, i, MODEL_SENT);
+    while (offset == RIG_MASK_REGISTER && rig_attempt_next(0, MODEL_SENT, &frame)) {
     }
     return true;
 }
@@ -197,72 +151,72 @@ TEST(test_pair_is_accepted_while_both_old_frames_are_sent) {
     rig[0].on_read = send_all_at_masking;
     TEST_ASSERT_EQUAL(2, send_pair(3, 4));
     rig[0].on_read = NULL;
-    assert_echo(266, 1);
-    assert_echo(298, 2);
-    assert_no_echo();
-    assert_on_bus(266, 3);
-    assert_on_bus(298, 4);
-    assert_nothing_waits();
-    assert_echo(266, 3);
-    assert_echo(298, 4);
-    assert_no_echo();
+    rig_assert_echo(266, 1);
+    rig_assert_echo(298, 2);
+    rig_assert_no_echo();
+    rig_assert_on_bus(266, 3);
+    rig_assert_on_bus(298, 4);
+    rig_assert_nothing_waits();
+    rig_assert_echo(266, 3);
+    rig_assert_echo(298, 4);
+    rig_assert_no_echo();
 }
 
 TEST(test_send_call_accepts_no_more_frames_than_wheels) {
     const iw_can_frame_t three[] = {rig_frame(266, 1), rig_frame(298, 2), rig_frame(300, 3)};
     TEST_ASSERT_EQUAL(2, can_send(driver, three, 3));
-    assert_on_bus(266, 1);
-    assert_on_bus(298, 2);
-    assert_nothing_waits();
+    rig_assert_on_bus(266, 1);
+    rig_assert_on_bus(298, 2);
+    rig_assert_nothing_waits();
 }
 
 TEST(test_newer_frame_replaces_the_waiting_one) {
-    (void)send(266, 1);
-    (void)send(298, 1);
-    TEST_ASSERT_EQUAL(1, send(266, 2));
-    assert_on_bus(266, 2);
-    assert_on_bus(298, 1);
-    assert_nothing_waits();
-    assert_echo(266, 1); // One echo for each accepted frame, with its own bytes,
-    assert_echo(266, 2); // after the newer frame was acknowledged.
-    assert_echo(298, 1);
-    assert_no_echo();
+    (void)rig_send(266, 1);
+    (void)rig_send(298, 1);
+    TEST_ASSERT_EQUAL(1, rig_send(266, 2));
+    rig_assert_on_bus(266, 2);
+    rig_assert_on_bus(298, 1);
+    rig_assert_nothing_waits();
+    rig_assert_echo(266, 1); // One echo for each accepted frame, with its own bytes,
+    rig_assert_echo(266, 2); // after the newer frame was acknowledged.
+    rig_assert_echo(298, 1);
+    rig_assert_no_echo();
 }
 
 TEST(test_third_frame_of_an_id_must_wait_and_changes_nothing) {
-    (void)send(298, 1);
-    (void)send(298, 2);
-    TEST_ASSERT_EQUAL(0, send(298, 3));
-    assert_on_bus(298, 2);
-    assert_nothing_waits();
-    assert_echo(298, 1);
-    assert_echo(298, 2);
-    assert_no_echo();
-    TEST_ASSERT_EQUAL(1, send(298, 3));
+    (void)rig_send(298, 1);
+    (void)rig_send(298, 2);
+    TEST_ASSERT_EQUAL(0, rig_send(298, 3));
+    rig_assert_on_bus(298, 2);
+    rig_assert_nothing_waits();
+    rig_assert_echo(298, 1);
+    rig_assert_echo(298, 2);
+    rig_assert_no_echo();
+    TEST_ASSERT_EQUAL(1, rig_send(298, 3));
+}
+
+static void end_frame_on_bus(model_end_t end) {
+    for (int i = 0; i < MODEL_MAILBOXES; i++) {
+        if (RIG_IS_ON_BUS(model, i)) {
+            can_model_end(model, i, end);
+        }
+    }
 }
 
 /// The frame under way ends while the driver polls TSR.
-static bool end_frame_on_bus(uint32_t offset) {
+static bool send_frame_at_poll(uint32_t offset) {
     if (offset != RIG_POLL_REGISTER) {
         return true;
     }
-    for (int i = 0; i < MODEL_MAILBOXES; i++) {
-        if (RIG_IS_ON_BUS(model, i)) {
-            can_model_end(model, i, MODEL_SENT);
-        }
-    }
+    end_frame_on_bus(MODEL_SENT);
     return false;
 }
 
-static bool lose_frame_on_bus(uint32_t offset) {
+static bool lose_frame_at_poll(uint32_t offset) {
     if (offset != RIG_POLL_REGISTER) {
         return true;
     }
-    for (int i = 0; i < MODEL_MAILBOXES; i++) {
-        if (RIG_IS_ON_BUS(model, i)) {
-            can_model_end(model, i, MODEL_BIT_ERROR);
-        }
-    }
+    end_frame_on_bus(MODEL_BIT_ERROR);
     return false;
 }
 
@@ -272,75 +226,74 @@ static void begin_first(void) {
 }
 
 TEST(test_old_frame_sent_during_its_replacement_has_its_own_echo) {
-    (void)send(266, 1);
+    (void)rig_send(266, 1);
     begin_first();
-    rig[0].on_read = end_frame_on_bus;
-    TEST_ASSERT_EQUAL(1, send(266, 2));
-    assert_echo(266, 1);
-    assert_no_echo();
-    assert_on_bus(266, 2);
-    assert_echo(266, 2);
-    assert_no_echo();
+    rig[0].on_read = send_frame_at_poll;
+    TEST_ASSERT_EQUAL(1, rig_send(266, 2));
+    rig_assert_echo(266, 1);
+    rig_assert_no_echo();
+    rig_assert_on_bus(266, 2);
+    rig_assert_echo(266, 2);
+    rig_assert_no_echo();
 }
 
 TEST(test_old_frame_failed_during_its_replacement_is_not_sent) {
-    (void)send(266, 1);
+    (void)rig_send(266, 1);
     begin_first();
-    rig[0].on_read = lose_frame_on_bus;
-    TEST_ASSERT_EQUAL(1, send(266, 2));
-    assert_no_echo();
-    assert_on_bus(266, 2);
-    assert_nothing_waits();
-    assert_echo(266, 1);
-    assert_echo(266, 2);
-    assert_no_echo();
+    rig[0].on_read = lose_frame_at_poll;
+    TEST_ASSERT_EQUAL(1, rig_send(266, 2));
+    rig_assert_no_echo();
+    rig_assert_on_bus(266, 2);
+    rig_assert_nothing_waits();
+    rig_assert_echo(266, 1);
+    rig_assert_echo(266, 2);
+    rig_assert_no_echo();
 }
 
 static void join_again(void) {
     TEST_ASSERT_EQUAL(IW_BUS_DOWN, can_bus_state(driver));
     (void)can_bus_state(driver);
-    can_model_recessive(model, 11);
-    TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, can_bus_state(driver));
+    rig_assert_active_after(0, 11);
 }
 
 TEST(test_frame_that_never_ends_has_a_bounded_wait) {
-    (void)send(266, 1);
+    (void)rig_send(266, 1);
     begin_first();
-    TEST_ASSERT_EQUAL(0, send(266, 2));
-    (void)lose_frame_on_bus(RIG_POLL_REGISTER);
+    TEST_ASSERT_EQUAL(0, rig_send(266, 2));
+    end_frame_on_bus(MODEL_BIT_ERROR);
     rig_serve(0);
-    assert_nothing_waits();
-    assert_no_echo();
-    TEST_ASSERT_EQUAL(1, send(266, 3));
-    assert_on_bus(266, 3);
-    assert_echo(266, 3);
-    assert_no_echo();
+    rig_assert_nothing_waits();
+    rig_assert_no_echo();
+    TEST_ASSERT_EQUAL(1, rig_send(266, 3));
+    rig_assert_on_bus(266, 3);
+    rig_assert_echo(266, 3);
+    rig_assert_no_echo();
 }
 
 TEST(test_purge_that_does_not_end_resets_the_controller) {
-    (void)send(266, 1);
-    (void)send(298, 1);
+    (void)rig_send(266, 1);
+    (void)rig_send(298, 1);
     begin_first();
     TEST_ASSERT_EQUAL(1, can_purge(driver));
     TEST_ASSERT_EQUAL(1, driver->resets);
     TEST_ASSERT_EQUAL_HEX32_MESSAGE(0, rig[0].reset, "the device is let go again");
-    TEST_ASSERT_LESS_THAN(0, send(266, 2));
+    TEST_ASSERT_LESS_THAN(0, rig_send(266, 2));
     join_again();
-    assert_nothing_waits();
-    assert_no_echo();
-    TEST_ASSERT_EQUAL(1, send(266, 3));
-    assert_on_bus(266, 3);
-    assert_echo(266, 3);
-    assert_no_echo();
+    rig_assert_nothing_waits();
+    rig_assert_no_echo();
+    TEST_ASSERT_EQUAL(1, rig_send(266, 3));
+    rig_assert_on_bus(266, 3);
+    rig_assert_echo(266, 3);
+    rig_assert_no_echo();
 }
 
 /// The frame was sent and acknowledged, but the core has not read its echo yet when the other frame must be purged by
 /// force.
 TEST(test_purge_with_a_reset_drops_earlier_echoes) {
     iw_can_frame_t echo;
-    (void)send(266, 1);
-    assert_on_bus(266, 1);
-    (void)send(298, 1);
+    (void)rig_send(266, 1);
+    rig_assert_on_bus(266, 1);
+    (void)rig_send(298, 1);
     model->abort_reads = UINT32_MAX;
     TEST_ASSERT_EQUAL(1, can_purge(driver));
     TEST_ASSERT_EQUAL(1, driver->resets);
@@ -348,28 +301,27 @@ TEST(test_purge_with_a_reset_drops_earlier_echoes) {
 }
 
 TEST(test_purge_of_a_controller_that_ignores_aborts_resets_it) {
-    (void)send(266, 1);
+    (void)rig_send(266, 1);
     model->abort_reads = UINT32_MAX;
     TEST_ASSERT_EQUAL(1, can_purge(driver));
-    assert_nothing_waits();
+    rig_assert_nothing_waits();
     join_again();
-    assert_nothing_waits();
+    rig_assert_nothing_waits();
     TEST_ASSERT_EQUAL(1, can_purge(driver));
     TEST_ASSERT_EQUAL(1, driver->resets);
 }
 
 TEST(test_purge_on_a_dominant_bus_leaves_no_frame) {
-    (void)send(266, 1);
-    (void)send(298, 1);
+    (void)rig_send(266, 1);
+    (void)rig_send(298, 1);
     begin_first();
-    (void)lose_frame_on_bus(RIG_POLL_REGISTER);
+    end_frame_on_bus(MODEL_BIT_ERROR);
     can_model_hold(model, 50, true);
     TEST_ASSERT_EQUAL(1, can_purge(driver));
     TEST_ASSERT_EQUAL(0, driver->resets);
-    can_model_recessive(model, 11);
-    TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, can_bus_state(driver));
-    assert_nothing_waits();
-    assert_no_echo();
+    rig_assert_active_after(0, 11);
+    rig_assert_nothing_waits();
+    rig_assert_no_echo();
 }
 
 /// ALST and TERR of an attempt stay readable after the abort of the mailbox. They are no echo, and they do not block
@@ -378,56 +330,54 @@ TEST(test_failed_attempts_before_an_abort_are_no_echo) {
     const model_end_t ends[] = {MODEL_LOST_ARBITRATION, MODEL_BIT_ERROR, MODEL_NO_ACKNOWLEDGEMENT};
     for (size_t i = 0; i < 3; i++) {
         model_frame_t frame;
-        (void)send(266, 1);
-        const int mailbox = can_model_offer(model, &frame);
-        can_model_begin(model, mailbox);
-        can_model_end(model, mailbox, ends[i]);
+        (void)rig_send(266, 1);
+        (void)rig_attempt_next(0, ends[i], &frame);
 #ifndef IWHEEL_RIG_FDCAN
         TEST_ASSERT_NOT_EQUAL(0, model->tsr & (0x0C0C0CU));
 #endif
         TEST_ASSERT_EQUAL(1, can_purge(driver));
-        assert_no_echo();
-        TEST_ASSERT_EQUAL(1, send(266, 2));
-        assert_on_bus(266, 2);
-        assert_echo(266, 2);
-        assert_no_echo();
+        rig_assert_no_echo();
+        TEST_ASSERT_EQUAL(1, rig_send(266, 2));
+        rig_assert_on_bus(266, 2);
+        rig_assert_echo(266, 2);
+        rig_assert_no_echo();
     }
 }
 
 TEST(test_slow_abort_is_waited_for) {
     model->abort_reads = 20;
-    (void)send(266, 1);
-    TEST_ASSERT_EQUAL(1, send(266, 2));
-    assert_on_bus(266, 2);
-    assert_nothing_waits();
+    (void)rig_send(266, 1);
+    TEST_ASSERT_EQUAL(1, rig_send(266, 2));
+    rig_assert_on_bus(266, 2);
+    rig_assert_nothing_waits();
 }
 
 TEST(test_fourth_frame_waits_for_a_free_mailbox) {
-    (void)send(266, 1);
-    (void)send(298, 1);
-    TEST_ASSERT_EQUAL(1, send(300, 1));
-    TEST_ASSERT_EQUAL(0, send(301, 1));
-    assert_on_bus(266, 1);
-    TEST_ASSERT_EQUAL(1, send(301, 1));
+    (void)rig_send(266, 1);
+    (void)rig_send(298, 1);
+    TEST_ASSERT_EQUAL(1, rig_send(300, 1));
+    TEST_ASSERT_EQUAL(0, rig_send(301, 1));
+    rig_assert_on_bus(266, 1);
+    TEST_ASSERT_EQUAL(1, rig_send(301, 1));
 }
 
 TEST(test_purge_aborts_all_frames) {
-    (void)send(266, 1);
-    (void)send(298, 1);
+    (void)rig_send(266, 1);
+    (void)rig_send(298, 1);
     TEST_ASSERT_EQUAL(1, can_purge(driver));
-    assert_nothing_waits();
-    assert_no_echo();
-    TEST_ASSERT_EQUAL(1, send(266, 2));
-    assert_on_bus(266, 2);
-    assert_echo(266, 2);
-    assert_no_echo();
+    rig_assert_nothing_waits();
+    rig_assert_no_echo();
+    TEST_ASSERT_EQUAL(1, rig_send(266, 2));
+    rig_assert_on_bus(266, 2);
+    rig_assert_echo(266, 2);
+    rig_assert_no_echo();
 }
 
 TEST(test_echo_from_before_a_purge_is_dropped) {
-    (void)send(266, 1);
-    assert_on_bus(266, 1);
+    (void)rig_send(266, 1);
+    rig_assert_on_bus(266, 1);
     TEST_ASSERT_EQUAL(1, can_purge(driver));
-    assert_no_echo();
+    rig_assert_no_echo();
 }
 
 TEST(test_purge_retains_received_frames) {
@@ -439,16 +389,16 @@ TEST(test_purge_retains_received_frames) {
 }
 
 TEST(test_frame_completed_during_a_purge_has_no_echo) {
-    (void)send(266, 1);
+    (void)rig_send(266, 1);
     begin_first();
-    rig[0].on_read = end_frame_on_bus;
+    rig[0].on_read = send_frame_at_poll;
     TEST_ASSERT_EQUAL(1, can_purge(driver));
-    assert_no_echo();
-    assert_nothing_waits();
-    (void)send(266, 2);
-    assert_on_bus(266, 2);
-    assert_echo(266, 2);
-    assert_no_echo();
+    rig_assert_no_echo();
+    rig_assert_nothing_waits();
+    (void)rig_send(266, 2);
+    rig_assert_on_bus(266, 2);
+    rig_assert_echo(266, 2);
+    rig_assert_no_echo();
 }
 
 static int mailbox_of(uint32_t id) {
@@ -472,16 +422,16 @@ static bool send_right_at_masking(uint32_t offset) {
 }
 
 static void fill_mailboxes(void) {
-    TEST_ASSERT_EQUAL(1, send(266, 1));
-    TEST_ASSERT_EQUAL(1, send(298, 1));
-    TEST_ASSERT_EQUAL(1, send(300, 1));
+    TEST_ASSERT_EQUAL(1, rig_send(266, 1));
+    TEST_ASSERT_EQUAL(1, rig_send(298, 1));
+    TEST_ASSERT_EQUAL(1, rig_send(300, 1));
 }
 
 TEST(test_purge_of_three_full_mailboxes_empties_them_all) {
     fill_mailboxes();
     TEST_ASSERT_EQUAL(1, can_purge(driver));
     TEST_ASSERT_EQUAL(0, driver->resets);
-    assert_nothing_waits();
+    rig_assert_nothing_waits();
     TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, can_bus_state(driver));
     fill_mailboxes();
 }
@@ -490,23 +440,23 @@ TEST(test_purge_while_a_frame_completes_leaves_no_echo_or_frame) {
     fill_mailboxes();
     rig[0].on_read = send_right_at_masking;
     TEST_ASSERT_EQUAL(1, can_purge(driver));
-    assert_no_echo();
-    assert_nothing_waits();
+    rig_assert_no_echo();
+    rig_assert_nothing_waits();
     TEST_ASSERT_EQUAL(0, driver->resets);
 }
 
 TEST(test_completion_during_another_abort_has_its_echo) {
     fill_mailboxes();
     rig[0].on_read = send_right_at_masking;
-    TEST_ASSERT_EQUAL(1, send(266, 2));
-    assert_echo(298, 1);
-    assert_no_echo();
-    assert_on_bus(266, 2);
-    assert_on_bus(300, 1);
-    assert_echo(266, 1);
-    assert_echo(266, 2);
-    assert_echo(300, 1);
-    TEST_ASSERT_EQUAL(1, send(298, 2));
+    TEST_ASSERT_EQUAL(1, rig_send(266, 2));
+    rig_assert_echo(298, 1);
+    rig_assert_no_echo();
+    rig_assert_on_bus(266, 2);
+    rig_assert_on_bus(300, 1);
+    rig_assert_echo(266, 1);
+    rig_assert_echo(266, 2);
+    rig_assert_echo(300, 1);
+    TEST_ASSERT_EQUAL(1, rig_send(298, 2));
 }
 
 TEST(test_purge_of_an_idle_device_succeeds) {
@@ -518,7 +468,7 @@ TEST(test_send_and_receive_of_a_stopped_device_fail) {
     iw_can_frame_t frame;
     rig_init(0, false);
     TEST_ASSERT_LESS_THAN(0, can_receive(driver, &frame));
-    TEST_ASSERT_LESS_THAN(0, send(266, 1));
+    TEST_ASSERT_LESS_THAN(0, rig_send(266, 1));
 }
 
 /// Random sends, transmissions, failures and purges: one echo with the bytes of each accepted frame, no echo without an
@@ -538,7 +488,7 @@ TEST(test_random_traffic_has_one_echo_for_each_frame) {
         case 0:
         case 1:
             mark = (uint8_t)(mark % 100U + 1U);
-            if (send((side == 0U) ? 266U : 298U, mark) > 0) {
+            if (rig_send((side == 0U) ? 266U : 298U, mark) > 0) {
                 TEST_ASSERT_LESS_THAN_MESSAGE(2, open[side], "a third frame is on its way");
                 marks[side][open[side]++] = mark;
                 newest_sent[side] = mark;
@@ -551,9 +501,7 @@ TEST(test_random_traffic_has_one_echo_for_each_frame) {
             }
             break;
         case 4:
-            if (can_model_offer(model, &frame) != MODEL_NONE) {
-                begin_first();
-                (void)lose_frame_on_bus(RIG_POLL_REGISTER);
+            if (rig_attempt_next(0, MODEL_BIT_ERROR, &frame)) {
                 model->tec = 0;
             }
             break;

@@ -6,9 +6,6 @@
 
 static iw_snapshot_t seen;
 
-void setUp(void);
-void tearDown(void);
-
 void setUp(void) {
     memset(&seen, 0, sizeof seen);
     seen.bus = IW_BUS_ACTIVE;
