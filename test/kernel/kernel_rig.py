@@ -68,8 +68,7 @@ class GpioButton:
         self.witness = Edges(self.chip.chip, self.chip.WITNESS, RISING)
         self.presses = []
         self.tick_us = self._learn_tick()
-        self.settings.setdefault("estop", {}).update({"line": self.line, "active": self.active})
-        self.write_config()
+        self.configure(estop={"line": self.line, "active": self.active})
 
     def estop_line(self):
         return self.line if self.estop else "none"
@@ -131,9 +130,7 @@ class GpioButton:
     def lose_chip(self):
         """The chip is removed while its line is requested. For the rules this is a press."""
         self.witness.close()
-        t_us = now_us()
-        self.chip.vanish()
-        self.timeline.append(Event(t_us, "press", now_us()))
+        self.pressed_by(self.chip.vanish)
 
     def find_chip(self):
         self.chip.appear()
@@ -170,11 +167,6 @@ class VcanRig(GpioButton, Rig):
     def wheels_bus(self):
         return self.interface
 
-    def relisten(self):
-        """After the interface was deleted and made again."""
-        self.bus.close()
-        self.bus = self.listen(self.bus.frames)
-
     def close(self, keep=False):
         super().close(keep)
         self.remove_button()
@@ -190,8 +182,7 @@ class TwoContactsRig(VcanRig):
     def make_button(self):
         super().make_button()
         self.second(False)
-        self.settings["estop"].update({"line2": self.line2, "line2_active": "low", "estop_discrepancy_ms": 1000})
-        self.write_config()
+        self.configure(estop={"line2": self.line2, "line2_active": "low", "estop_discrepancy_ms": 1000})
 
     def second(self, pressed):
         """Moves the second contact alone; a press may stop the wheels from now on."""
@@ -218,7 +209,7 @@ class HighVcanRig(VcanRig):
     def close_contact(self):
         self.release()
         client = self.client("starter")
-        self.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"])
+        self.wait_at_rest(client)
         for _ in range(100):
             if client.request("reset")["ok"]:
                 break

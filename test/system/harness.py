@@ -148,6 +148,12 @@ class Process:
         with open(self.output, encoding="utf-8", errors="replace") as file:
             return file.read()
 
+    def cpu_share(self, seconds):
+        """Of one processor, in that time."""
+        cpu, begin = self.cpu_seconds(), time.monotonic()
+        time.sleep(seconds)
+        return (self.cpu_seconds() - cpu) / (time.monotonic() - begin)
+
     def cpu_seconds(self):
         with open(f"/proc/{self.child.pid}/stat", encoding="ascii") as file:
             fields = file.read().rsplit(")", 1)[1].split()
@@ -247,9 +253,7 @@ class Rig:
         self.settings = {section: dict(keys) for section, keys in DEFAULTS.items()}
         self.settings["northbound"]["group"] = grp.getgrgid(os.getgid()).gr_name
         self.settings["record"] = {"directory": self.folder}
-        for section, keys in (config or {}).items():
-            self.settings.setdefault(section, {}).update(keys)
-        self.write_config()
+        self.configure(**(config or {}))
         self.prepare()
         self.sim = self.start_wheels(sim_args)
         self.bus = self.listen()
@@ -295,6 +299,12 @@ class Rig:
     def program(self, name):
         return find_program(self.build, name)
 
+    def configure(self, **sections):
+        """Changes these keys of the gateway's configuration, and writes it."""
+        for section, keys in sections.items():
+            self.settings.setdefault(section, {}).update(keys)
+        self.write_config()
+
     def write_config(self, name="gateway.conf"):
         with open(self.path(name), "w", encoding="utf-8") as file:
             for section, keys in self.settings.items():
@@ -338,8 +348,7 @@ class Rig:
             if setup:
                 setup()
 
-        self.gateway = Process(self.gateway_command(*extra), self.path("gateway.out"), prepare)
-        self.processes.append(self.gateway)
+        self.gateway = self.launch(self.gateway_command(*extra), "gateway.out", prepare)
         self.timeline.append(Event(begin_us, "start"))
         if restart_hold:
             self.timeline.append(Event(begin_us, "restart_hold", within_us=self.restart_us))
@@ -361,6 +370,11 @@ class Rig:
         client.close()
         return answered_ms
 
+    def connect_to_new(self, *extra, name="test", **options):
+        """Starts the gateway as above, and returns a client of it."""
+        self.start_gateway(*extra, **options)
+        return self.client(name)
+
     def wait_status(self, client, condition, seconds=4.0):
         """Polls the status until it fulfils the condition; returns it, or None after that time."""
         deadline = time.monotonic() + seconds
@@ -374,6 +388,10 @@ class Rig:
                 return None
             time.sleep(0.05)
 
+    def wait_at_rest(self, client, seconds=4.0, active=False):
+        """As wait_status, until both wheels are online and at standstill, and with `active` the bus is active."""
+        return self.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"] and (not active or s["bus"]["state"] == "active"), seconds)
+
     def kill_gateway(self, number):
         """Ends it by a signal that it cannot or does not handle."""
         self.timeline.append(Event(now_us(), "end"))
@@ -382,8 +400,7 @@ class Rig:
 
     def stranger(self, way, names):
         """Another user's process that holds these names, "listening" or "silent". Needs root."""
-        process = Process([sys.executable, "-c", HOLD_NAMES, way, *names], self.path("stranger.out"))
-        self.processes.append(process)
+        process = self.launch([sys.executable, "-c", HOLD_NAMES, way, *names], "stranger.out")
         deadline = time.monotonic() + 10
         while "held" not in process.text():
             if time.monotonic() > deadline:
@@ -396,11 +413,14 @@ class Rig:
         self.clients.append(client)
         return client
 
-    def spawn(self, script, *arguments):
-        output = self.path(f"{script}.{len(self.processes)}.out")
-        process = Process([sys.executable, os.path.join(HERE, script), *map(str, arguments)], output)
+    def launch(self, command, output, setup=None):
+        """Starts a process that ends with this rig; `output`: the name of its file."""
+        process = Process(command, self.path(output), setup)
         self.processes.append(process)
         return process
+
+    def spawn(self, script, *arguments):
+        return self.launch([sys.executable, os.path.join(HERE, script), *map(str, arguments)], f"{script}.{len(self.processes)}.out")
 
     def take_events(self, process):
         """Adds the output of a drive_client.py to the timeline."""
@@ -410,22 +430,31 @@ class Rig:
                 numbers = [int(word) if word.lstrip("-").isdigit() else word for word in words]
                 self.timeline.append(Event(*numbers)._replace(ok=words[3] == "True"))
 
-    def restart_sim(self, frames):
+    def restart_sim(self, frames, extra=()):
         """Starts another simulator after the first one ended; `frames`: the frames of the recorder until then."""
         self.sim.end()
-        self.sim = Sim(self)
+        self.sim = Sim(self, extra)
         self.bus = self.listen(frames)
+
+    def relisten(self):
+        """After the interface was made again or set up again."""
+        self.bus.close()
+        self.bus = self.listen(self.bus.frames)
 
     # The timeline -----------------------------------------------------------------------------------------------------
 
     def note(self, kind, **fields):
         self.timeline.append(Event(now_us(), kind, **fields))
 
-    def press(self):
+    def pressed_by(self, action):
+        """Does what counts as a press of the e-stop. Returns when it began."""
         t_us = now_us()
-        self.sim.ask("estop press")
+        action()
         self.timeline.append(Event(t_us, "press", now_us()))
         return t_us
+
+    def press(self):
+        return self.pressed_by(lambda: self.sim.ask("estop press"))
 
     def release(self):
         self.sim.ask("estop release")
@@ -434,6 +463,15 @@ class Rig:
         """Injects a fault that must stop the wheels."""
         self.timeline.append(Event(now_us(), kind, within_us=within_ms * 1000))
         return self.sim.ask(command)
+
+    def cut_by(self, action, within_ms):
+        """Does what takes the bus away: the wheels must stop within that time after it was done. Returns when it was done."""
+        begin_us = now_us()
+        action()
+        done_us = now_us()
+        self.timeline.append(Event(done_us, "dead"))
+        self.timeline.append(Event(begin_us, "cut", within_us=done_us - begin_us + within_ms * 1000))
+        return done_us
 
     def judge(self, moves=True, **options):
         """Stops recording and judges. Call it once, at the end."""

@@ -4,6 +4,7 @@
 import time
 import unittest
 
+from client import Streamer
 from harness import Rig
 from judge_log import percentile
 from verdict import CHECK, RULE, TIMING, Failure, Findings
@@ -59,11 +60,17 @@ class Test(Findings):
         self.rigs.append(rig)
         return rig
 
-    def running(self, config=None, **options):
-        """A rig with a running gateway, both wheels online and at standstill, and a client."""
+    def running(self, config=None, sim=(), setup=None, wheels=True, **options):
+        """A rig with a running gateway, and a client; `sim`: commands to the simulator before. With `wheels` both are online and at standstill."""
         rig = self.rig(config, **options)
-        rig.start_gateway()
-        return rig, rig.client()
+        for command in sim:
+            rig.sim.ask(command)
+        return rig, rig.connect_to_new(setup=setup, wheels=wheels)
+
+    def driving(self, config=None, speed=300, seconds=0.7, every=0.02, **options):
+        """A rig that drives, with a command every 20 ms: rig, client, stream."""
+        rig, client = self.running(config, **options)
+        return rig, client, self.start_driving(client, speed, speed, seconds, every)
 
     def check(self, condition, text, timing=False, at_us=0, need_us=None):
         """`need_us`: the shortest stall of the machine that explains the failure, as in verdict.Failure."""
@@ -95,10 +102,40 @@ class Test(Findings):
         self.expect(reply)
         return reply
 
+    def start_driving(self, client, left, right, seconds, every=0.05):
+        """Arms, and drives in the background. Returns the Streamer after that time."""
+        self.arm(client)
+        stream = Streamer(client, left, right, every)
+        time.sleep(seconds)
+        return stream
+
+    def arm_and_drive(self, client, left, right, seconds, every=0.05):
+        self.arm(client)
+        self.drive_for(client, left, right, seconds, every)
+
     def drive_for(self, client, left, right, seconds, every=0.05):
         refusal = client.stream(left, right, seconds, every)
         self.overslept(client.late)
         self.check(refusal is None, f"drive was refused: {refusal}")
+
+    def stop_for(self, client, seconds):
+        client.request("stop")
+        time.sleep(seconds)
+
+    def silence(self, rig, client, seconds=4, text="silence"):
+        """Checks that the gateway listens within that time, so that it sends nothing any more."""
+        return self.check(rig.wait_status(client, lambda s: s["state"] == "listening", seconds), text)
+
+    def reset(self, client, seconds=6.0):
+        """Repeats reset until the gateway accepts it. Returns the errors of the refusals."""
+        reasons, end = [], time.monotonic() + seconds
+        while True:
+            reply = client.request("reset")
+            if reply["ok"] or time.monotonic() > end:
+                self.expect(reply)
+                return reasons
+            reasons.append(reply["error"])
+            time.sleep(0.05)
 
     def overslept(self, waits):
         """Waits of the test's own client that ended late, [(end_us, late_us)]. A rig in real time counts the long ones as stalls."""

@@ -9,30 +9,28 @@ import time
 
 import netdev
 from catalogue import add, kernel_test
-from client import Streamer
 from fake_slcan import DEPTH
 from harness import now_us
 from judge_log import LEFT, RIGHT
 from kernel_rig import SlcanRig
 from scenario import REGISTRY
 from scenarios import bus_states
-from scenarios.bus_faults import wait_reset
-from scenarios.process import driving
+from scenarios.bus_states import judge_repaired
 
-from .interface import back_to_driving, lose_interface, stale_after
+from .interface import lose_interface
 
 TTY_FRAMES = 40  # what a stalled pty, the driver and the queue hold at most: measured, with a margin
 
 
 @kernel_test("nominal drive through an adapter", "adapter", 0, SlcanRig, pace=1)
 def slcan_nominal(t):
-    rig, client, stream = driving(t, speed=400)
+    rig, client, stream = t.driving(speed=400)
     status = client.request("status")
     t.check(abs(status["left"]["speed_mm_s"] - 400) < 40, f"left {status['left']['speed_mm_s']} mm/s")
     t.check(status["bus"]["echo"] == "unproven", f"echo {status['bus']['echo']}")
     t.check(stream.stop() is None, "the stream was not refused")
     client.request("stop")
-    t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 4), "silence")
+    t.silence(rig, client)
     t.judge(rig)
 
 
@@ -62,12 +60,7 @@ for there, here in ADAPTER_STATES:  # the adapter does what the simulator does o
 
 def stalled(t, seconds, setup=None):
     """The adapter accepts nothing for that long; returns the rig, and the frames that came out afterwards as [(t_us, id, mm/s)]."""
-    rig = t.rig({"drive": {"accel_mm_s2": 2000}})
-    rig.start_gateway(setup=setup)
-    client = rig.client()
-    t.arm(client)
-    stream = Streamer(client, 800, 800, 0.02)
-    time.sleep(0.8)
+    rig, client, stream = t.driving({"drive": {"accel_mm_s2": 2000}}, setup=setup, speed=800, seconds=0.8)
     rig.note("cut", within_us=150_000)
     rig.adapter.stall(True)
     rig.note("dead")
@@ -97,11 +90,9 @@ def bounded_residue(t, rig, back_us):
 
 def judge_after_residue(t, rig, client, back_us):
     """The old frames were judged already; the rest by the rules."""
-    wait_reset(t, client, 12)
-    t.arm(client)
-    t.drive_for(client, 200, 200, 0.5)
-    client.request("stop")
-    time.sleep(0.4)
+    t.reset(client, 12)
+    t.arm_and_drive(client, 200, 200, 0.5)
+    t.stop_for(client, 0.4)
     rig.bus.frames[:] = [f for f in rig.bus.frames if not (f.id in (LEFT, RIGHT) and back_us <= f.t_us < back_us + 500_000)]
     t.judge(rig)
 
@@ -132,12 +123,7 @@ def row17_stall_short(t):
 
 
 def power_cut(t, seconds, setup):
-    rig = t.rig({"drive": {"accel_mm_s2": 2000}})
-    rig.start_gateway(setup=setup)
-    client = rig.client()
-    t.arm(client)
-    stream = Streamer(client, 800, 800, 0.02)
-    time.sleep(1.0)
+    rig, client, stream = t.driving({"drive": {"accel_mm_s2": 2000}}, setup=setup, speed=800, seconds=1.0)
     rig.fault("power off", within_ms=120)
     rig.note("dead")
     time.sleep(0.3)
@@ -148,7 +134,7 @@ def power_cut(t, seconds, setup):
     back_us = now_us()
     rig.sim.ask("power on")
     rig.note("alive")
-    online = rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"], 10)
+    online = rig.wait_at_rest(client, 10)
     t.check(online, "the wheels are online again")
     time.sleep(0.5)
     late = rig.bus.setpoints(back_us)
@@ -169,15 +155,14 @@ def row18_power_cut_adapter(t):
 
 @kernel_test("adapter unplugged in motion and plugged in again: stop, found by name, no backlog", "adapter", 15, SlcanRig)
 def row15_unplugged(t):
-    rig, client, stream = driving(t)
+    rig, client, stream = t.driving()
     # The gateway may notice the unsent frame and the missing telemetry before the kernel reports that the adapter is gone.
     lose_interface(t, rig, client, stream, rig.adapter.unplug, ("bus_down", "send_stalled", "wheel_lost"))
     t.check(not rig.adapter.is_there(), "the interface is gone")
     time.sleep(1.0)
-    rig.adapter.plug()
-    rig.adapter.link_up()
-    back_us = now_us()
-    rig.note("alive")
-    back_to_driving(t, rig, client)
-    stale_after(t, rig, back_us)
-    t.judge(rig)
+
+    def plug_in():
+        rig.adapter.plug()
+        rig.adapter.link_up()
+
+    judge_repaired(t, rig, client, plug_in)

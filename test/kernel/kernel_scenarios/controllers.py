@@ -7,13 +7,13 @@ import netdev
 from can_bus import CanBus
 from catalogue import add, kernel_test
 from distribution import CONTROLLERS
-from harness import Rig, now_us
+from harness import Rig
 from kernel_rig import remove_marker
 from scenario import REGISTRY
-from scenarios.process import driving
+from scenarios.bus_states import judge_repaired
 
 from .alike import row_of
-from .interface import back_to_driving, lose_interface, row17_no_buffers, stale_after
+from .interface import lose_interface, row17_no_buffers
 
 AS_DOCUMENTED = {"bitrate": 1_000_000, "sample-point": 0.625}
 
@@ -46,11 +46,6 @@ class ControllerRig(Rig):
     def gateway_bus(self):
         return self.interface
 
-    def relisten(self):
-        """After the interfaces were set up again."""
-        self.bus.close()
-        self.bus = self.listen(self.bus.frames)
-
     def close(self, keep=False):
         super().close(keep)
         for name in CONTROLLERS:
@@ -64,7 +59,7 @@ def controller_test(title, row):
 
 @controller_test("bit timing over netlink is confirmed, the echo proven; it drives", 0)
 def controller_nominal(t):
-    rig, client, stream = driving(t, speed=400)
+    rig, client, stream = t.driving(speed=400)
     bus = client.request("status")["bus"]
     wanted = {"name": rig.interface, "state": "active", "timing": "confirmed", "echo": "proven", "bitrate": 1_000_000}
     t.check({key: bus[key] for key in wanted} == wanted, f"bus {bus}")
@@ -73,21 +68,16 @@ def controller_nominal(t):
     t.check(abs(status["left"]["speed_mm_s"] - 400) < 40, f"left {status['left']['speed_mm_s']} mm/s")
     t.check(stream.stop() is None, "the stream was not refused")
     client.request("stop")
-    t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 4), "silence")
+    t.silence(rig, client)
     t.judge(rig)
 
 
 @controller_test("interface down in motion, and up again: stop, no backlog", 15)
 def controller_row15_down_and_up(t):
-    rig, client, stream = driving(t)
+    rig, client, stream = t.driving()
     lose_interface(t, rig, client, stream, lambda: netdev.down(rig.interface))
     time.sleep(1.0)
-    set_up(rig.interface)
-    back_us = now_us()
-    rig.note("alive")
-    back_to_driving(t, rig, client)
-    stale_after(t, rig, back_us)
-    t.judge(rig)
+    judge_repaired(t, rig, client, lambda: set_up(rig.interface))
 
 
 @controller_test("a queue that accepts nothing for 300 ms in motion: stop, no old frame afterwards", 17)
@@ -112,8 +102,7 @@ def wrong_timing(t, **timing):
         set_up(name, **timing)
     rig.relisten()
     rig.sim = type(rig.sim)(rig)
-    rig.start_gateway(wheels=False)
-    client = rig.client()
+    client = rig.connect_to_new(wheels=False)
     time.sleep(1.2)
     status = client.request("status")
     t.check(status["bus"]["timing"] == "contradicted", f"bus {status['bus']}")

@@ -7,11 +7,9 @@ import time
 
 import netdev
 from catalogue import add, kernel_test
-from client import Streamer
 from gpio_sim import Edges
 from kernel_rig import ESTOP_US, LEVEL_US, HighVcanRig, SlcanRig, TwoContactsRig, VcanRig, virtual
 from scenario import Skip
-from scenarios.estop import reset
 
 PRESSES, PRESSES_HIGH, PRESSES_REAL_TIME, PRESSES_FULL = 100, 25, 25, 1000
 SERIES = 100  # presses of one gateway: its recording fits into a small machine
@@ -21,9 +19,7 @@ PULSES_MS = (1, 2, 3, 5, 7, 10, 15, 20)
 
 def one_press(t, rig, driver, other, chance):
     """Arms, drives, presses at a random moment of the ramp or the steady part, releases, resets."""
-    t.arm(driver)
-    stream = Streamer(driver, chance.randrange(-600, 600), chance.randrange(-600, 600))
-    time.sleep(chance.uniform(0.05, 0.6))
+    stream = t.start_driving(driver, chance.randrange(-600, 600), chance.randrange(-600, 600), chance.uniform(0.05, 0.6))
     pressed_us = rig.press()
     time.sleep(chance.uniform(0.01, 0.05))
     status = other.request("status")
@@ -34,7 +30,7 @@ def one_press(t, rig, driver, other, chance):
     rig.release()
     time.sleep(chance.uniform(0, 0.05))
     t.rule(other.request("status")["state"] == "latched", "release alone must not unlatch", at_us=pressed_us)
-    reset(t, other, 6.0)
+    t.reset(other)
     return not t.failures
 
 
@@ -114,14 +110,12 @@ def pulses(t):
     chance = random.Random(t.plan["seed"])
     rig, client = t.running()
     for pulse_ms in PULSES_MS:
-        t.arm(client)
-        stream = Streamer(client, 300, 300)
-        time.sleep(chance.uniform(0.2, 0.3))
+        stream = t.start_driving(client, 300, 300, chance.uniform(0.2, 0.3))
         rig.pulse(pulse_ms / 1000)
         time.sleep(0.05)
         stream.stop()
         t.stopped_by(client, "estop_line")
-        reset(t, client, 6.0)
+        t.reset(client)
     t.figure(f"{len(PULSES_MS)} pulses of {PULSES_MS[0]} to {PULSES_MS[-1]} ms")
     t.judge(rig)
 
@@ -138,15 +132,12 @@ def row12_pulses_high(t):
 
 @kernel_test("a pulse in the same instant as its end latches: the edge counts, not the level", "estop", 12)
 def row12_glitch(t):
-    rig, client = t.running()
-    t.arm(client)
-    stream = Streamer(client, 300, 300)
-    time.sleep(0.4)
+    rig, client, stream = t.driving(seconds=0.4, every=0.05)
     rig.pulse(0)
     time.sleep(0.05)
     stream.stop()
     t.stopped_by(client, "estop_line")
-    reset(t, client, 6.0)
+    t.reset(client)
     t.judge(rig)
 
 
@@ -161,9 +152,7 @@ def row11_two_lines(t):
     rig, client = t.running()
     for second_too in (False, True):
         for first in (True, False):
-            t.arm(client)
-            stream = Streamer(client, 300, 300)
-            time.sleep(0.4)
+            stream = t.start_driving(client, 300, 300, 0.4)
             (rig.press if first else lambda: rig.second(True))()
             time.sleep(0.05)
             expect_at(t, rig, client, "pressed", "line" if first else "line2")
@@ -177,7 +166,7 @@ def row11_two_lines(t):
                 expect_at(t, rig, client, "pressed", "both")
             rig.release()
             rig.second(False)
-            reset(t, client, 6.0)
+            t.reset(client)
             tried = client.request("status")["estop"]["tried_wall_us"]
             t.check((tried is not None) == second_too, f"tried: {tried}, both were pressed: {second_too}")
     t.judge(rig)
@@ -185,10 +174,7 @@ def row11_two_lines(t):
 
 @kernel_test("one of two contacts shorted: reported, and no reset until both were pressed, then released", "estop", 13, TwoContactsRig)
 def row13_line_shorted(t):
-    rig, client = t.running()
-    t.arm(client)
-    stream = Streamer(client, 300, 300)
-    time.sleep(0.4)
+    rig, client, stream = t.driving(seconds=0.4, every=0.05)
     rig.press()
     time.sleep(0.05)
     stream.stop()
@@ -212,17 +198,15 @@ def row13_line_shorted(t):
     rig.release()
     rig.second(False)
     expect_at(t, rig, client, "released", "neither")
-    reset(t, client, 6.0)
-    t.arm(client)
-    t.drive_for(client, 200, 200, 0.5)
+    t.reset(client)
+    t.arm_and_drive(client, 200, 200, 0.5)
     t.judge(rig)
 
 
 @kernel_test("one line under two names as both contacts: no start, and the message names the keys", "estop", 29, TwoContactsRig)
 def row29_line_twice(t):
     rig = t.rig()
-    rig.settings["estop"]["line2"] = f"{rig.chip.chip}:{rig.chip.OFFSET}"
-    rig.write_config()
+    rig.configure(estop={"line2": f"{rig.chip.chip}:{rig.chip.OFFSET}"})
     done = subprocess.run(rig.gateway_command(), capture_output=True, text=True, timeout=10, check=False)
     t.check(done.returncode == 78, f"exit code {done.returncode}")
     t.check("line and line2 are the same line" in done.stderr, f"names the keys: {done.stderr}")
@@ -231,8 +215,7 @@ def row29_line_twice(t):
 @kernel_test("a chattering contact on release: reset waits for a quiet line", "estop", 13)
 def row13_chatter(t):
     rig, client = t.running()
-    t.arm(client)
-    t.drive_for(client, 200, 200, 0.5)
+    t.arm_and_drive(client, 200, 200, 0.5)
     rig.press()
     time.sleep(1.5)
     for _ in range(400):
@@ -245,7 +228,7 @@ def row13_chatter(t):
         if t.failures:
             break
     rig.release()
-    reset(t, client, 6.0)
+    t.reset(client)
     time.sleep(0.3)
     t.check(client.request("status")["state"] == "listening", "then it is accepted")
     t.judge(rig)
@@ -255,9 +238,8 @@ def row13_chatter(t):
 def row13_pressed_at_start(t):
     rig = t.rig()
     rig.chip.pull(rig.active == "high")
-    rig.start_gateway(wheels=False)
-    client = rig.client()
-    online = rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"], 3)
+    client = rig.connect_to_new(wheels=False)
+    online = rig.wait_at_rest(client, 3)
     t.check(online and online["state"] == "latched", f"latched from the start: {online and online['state']}")
     t.stopped_by(client, "estop_line")
     for _ in range(5):
@@ -265,15 +247,14 @@ def row13_pressed_at_start(t):
     rig.release()
     time.sleep(1.5)
     t.rule(client.request("status")["state"] == "latched", "release does not unlatch")
-    reset(t, client)
+    t.reset(client, 4.0)
     for _ in range(5):
         reply = client.request("reset")
         t.check(reply["ok"] and reply["state"] == "listening", f"repeated reset: {reply}")
     t.expect(client.drive(200, 200), "not_armed")
     time.sleep(0.7)
     t.rule(not rig.bus.setpoints(), "latched from listening and reset: nothing is sent")
-    t.arm(client)
-    t.drive_for(client, 200, 200, 0.5)
+    t.arm_and_drive(client, 200, 200, 0.5)
     t.judge(rig)
 
 
@@ -283,25 +264,20 @@ def lost_chip(t, rig, client, after_s=0.6):
     Telemetry is slow, so that it does not wake the gateway by chance: the removal of the chip wakes no process.
     """
     rig.sim.ask("slow 40")
-    t.arm(client)
-    stream = Streamer(client, 300, 300)
-    time.sleep(after_s)
+    stream = t.start_driving(client, 300, 300, after_s)
     rig.lose_chip()
     time.sleep(0.2)
     stream.stop()
     t.stopped_by(client, "estop_line")
-    cpu, begin = rig.gateway.cpu_seconds(), time.monotonic()
-    time.sleep(2.0)
-    share = (rig.gateway.cpu_seconds() - cpu) / (time.monotonic() - begin)
+    share = rig.gateway.cpu_share(2.0)
     t.check(share < 0.5, f"{100 * share:.0f} % CPU without the line", True)
     refusal = client.request("reset")
     t.check(not refusal["ok"], "no reset without a line")
     rig.find_chip()
     t.check(rig.wait_status(client, lambda s: s["estop"]["state"] == "released", 3), "found again")
     t.rule(client.request("status")["state"] == "latched", "its return alone does not unlatch")
-    reset(t, client, 6.0)
-    t.arm(client)
-    t.drive_for(client, 200, 200, 0.5)
+    t.reset(client)
+    t.arm_and_drive(client, 200, 200, 0.5)
 
 
 @kernel_test("the GPIO chip disappears in motion, at every phase of the cycle, and returns", "estop", 14)
@@ -310,7 +286,7 @@ def row14_chip_vanishes(t):
     for after_s in (0.6, 0.603, 0.608, 0.612, 0.617):
         lost_chip(t, rig, client, after_s)
         client.request("stop")
-        t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 4), "silence")
+        t.silence(rig, client)
     t.judge(rig)
 
 
@@ -325,18 +301,16 @@ def row14_chip_vanishes_real_time(t):
 def row14_no_chip_at_start(t):
     rig = t.rig()
     rig.lose_chip()
-    rig.start_gateway(wheels=False)
-    client = rig.client()
-    rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"], 3)
+    client = rig.connect_to_new(wheels=False)
+    rig.wait_at_rest(client, 3)
     status = client.request("status")
     t.check(status["state"] == "latched", f"{status['state']}")
     t.check(status["estop"]["state"] == "unreadable", f"e-stop {status['estop']['state']}")
     t.check(rig.line in rig.gateway.text(), f"the log names the line: {rig.gateway.text()[-300:]}")
     t.expect(client.request("reset"), "estop_pressed")
     rig.find_chip()
-    reset(t, client, 6.0)
-    t.arm(client)
-    t.drive_for(client, 200, 200, 0.5)
+    t.reset(client)
+    t.arm_and_drive(client, 200, 200, 0.5)
     t.judge(rig)
 
 
@@ -344,24 +318,20 @@ def row14_no_chip_at_start(t):
 def row14_line_busy(t):
     rig = t.rig()
     holder = Edges(rig.chip.chip, rig.chip.OFFSET)
-    rig.start_gateway(wheels=False)
-    client = rig.client()
-    rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"], 3)
+    client = rig.connect_to_new(wheels=False)
+    rig.wait_at_rest(client, 3)
     status = client.request("status")
     t.check(status["state"] == "latched" and status["estop"]["state"] == "unreadable", f"{status['state']}, {status['estop']}")
     text = rig.gateway.text()
     t.check("busy" in text.lower(), f"the log reports that it is busy: {text[-300:]}")
     t.expect(client.request("reset"), "estop_pressed")
-    cpu, begin = rig.gateway.cpu_seconds(), time.monotonic()
-    time.sleep(2.0)
-    t.check((rig.gateway.cpu_seconds() - cpu) / (time.monotonic() - begin) < 0.5, "no busy loop", True)
+    t.check(rig.gateway.cpu_share(2.0) < 0.5, "no busy loop", True)
     lines = len(rig.gateway.text().splitlines()) - len(text.splitlines())
     t.check(lines <= 3, f"{lines} lines of log in 2 s of a busy line")
     holder.close()
     rig.release()
-    reset(t, client, 6.0)
-    t.arm(client)
-    t.drive_for(client, 200, 200, 0.5)
+    t.reset(client)
+    t.arm_and_drive(client, 200, 200, 0.5)
     t.judge(rig)
 
 
@@ -369,11 +339,9 @@ def row14_line_busy(t):
 def row14_line_names(t):
     rig = t.rig()
     rig.line = f"{rig.chip.chip}:{rig.chip.OFFSET}"
-    rig.start_gateway()
-    client = rig.client()
+    client = rig.connect_to_new()
     t.check(client.request("status")["estop"]["state"] == "released", "read by chip and offset")
-    t.arm(client)
-    t.drive_for(client, 200, 200, 0.4)
+    t.arm_and_drive(client, 200, 200, 0.4)
     rig.press()
     time.sleep(0.1)
     t.stopped_by(client, "estop_line")
@@ -393,8 +361,7 @@ def row13_button_tried(t):
         return warned
 
     def started():
-        rig.start_gateway()
-        client = rig.client()
+        client = rig.connect_to_new()
         rig.wait_status(client, lambda s: s["memory"]["state"] in ("new", "kept"), 3)
         time.sleep(0.2)
         return client
@@ -407,15 +374,14 @@ def row13_button_tried(t):
     t.check(untried(client), "the button was not pressed yet")
     reply = client.request("arm", name="tester")
     t.check(reply["ok"] and any("never seen to work" in warning for warning in reply["warnings"]), f"arm warns: {reply}")
-    client.request("stop")
-    time.sleep(3)
+    t.stop_for(client, 3)
     rig.press()
     time.sleep(0.3)
     t.check(untried(client), "a press alone does not test it")
     rig.release()
     time.sleep(1.5)
     t.check(not untried(client), "pressed and released")
-    reset(t, client, 6.0)
+    t.reset(client)
     time.sleep(1.5)
     ended(client)
     client = started()
@@ -424,16 +390,13 @@ def row13_button_tried(t):
     rig.line = f"{rig.chip.chip}:{rig.chip.OFFSET}"
     client = started()
     t.check(untried(client), "its line has another configuration")
-    t.arm(client)
-    t.drive_for(client, 200, 200, 0.5)
+    t.arm_and_drive(client, 200, 200, 0.5)
     t.judge(rig)
 
 
 @kernel_test("an adapter without rights over the interface drives and stops as well", "estop", 11, SlcanRig)
 def row11_without_rights(t):
-    rig = t.rig()
-    rig.start_gateway(setup=netdev.without_net_admin)
-    client = rig.client()
+    rig, client = t.running(setup=netdev.without_net_admin)
     chance = random.Random(t.plan["seed"])
     for _ in range(5):
         if not one_press(t, rig, client, client, chance):

@@ -5,7 +5,6 @@ import threading
 import time
 
 from catalogue import kernel_test
-from scenarios.process import driving
 
 
 class Sender(threading.Thread):
@@ -38,7 +37,7 @@ class Sender(threading.Thread):
 
 
 def babble(t, ids, every, seconds=3.0):
-    rig, client, stream = driving(t)
+    rig, client, stream = t.driving()
     sender = Sender(rig.bus, [(can_id, bytes(8)) for can_id in ids], every)
     cpu, begin = rig.gateway.cpu_seconds(), time.monotonic()
     time.sleep(seconds)
@@ -48,8 +47,7 @@ def babble(t, ids, every, seconds=3.0):
     t.check(refusal is None, f"the owner was refused: {refusal}")
     t.check(client.request("status")["state"] == "armed", "it drives on")
     t.figure(f"{sender.count / seconds:.0f} foreign frames/s, {percent:.0f} % CPU")
-    client.request("stop")
-    time.sleep(0.6)
+    t.stop_for(client, 0.6)
     t.judge(rig)
 
 

@@ -9,12 +9,9 @@ import sys
 import time
 
 from catalogue import kernel_test
-from client import Streamer
-from harness import STRANGER, Process, become_stranger, lock_names, now_us, wait_connect
+from harness import STRANGER, become_stranger, lock_names, now_us, wait_connect
 from judge_log import GAP_US, Event
 from scenario import REGISTRY
-from scenarios.bus_faults import wait_reset
-from scenarios.process import driving
 
 HOUR_NS = 3600 * 10**9
 
@@ -28,7 +25,7 @@ def step_clock(rig, nanoseconds):
 
 @kernel_test("wall clock one hour back and forth in motion: nothing happens", "host", 24)
 def row24_wall_clock(t):
-    rig, client, stream = driving(t)
+    rig, client, stream = t.driving()
     for step in (HOUR_NS, -2 * HOUR_NS, HOUR_NS):
         step_clock(rig, step)
         time.sleep(1.0)
@@ -38,8 +35,7 @@ def row24_wall_clock(t):
     t.check(status["state"] == "armed", f"{status['state']}")
     off_s = abs(status["wall_us"] / 1e6 - time.time())
     t.check(off_s < 1, f"status reports the new wall time, off by {off_s:.0f} s")
-    client.request("stop")
-    time.sleep(0.4)
+    t.stop_for(client, 0.4)
     t.judge(rig)
 
 
@@ -50,7 +46,7 @@ def row24_client_stopped(t):
 
 @kernel_test("no free CPU: six busy programs; the gap is within its limit, or it stops from zero", "starved", 24)
 def row24_starved(t):
-    rig, client, stream = driving(t)
+    rig, client, stream = t.driving()
     hogs = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(6)]
     for hog in hogs:
         os.setpriority(os.PRIO_PROCESS, hog.pid, 19)
@@ -65,8 +61,7 @@ def row24_starved(t):
     t.figure("drove on" if refusal is None else f"stopped: {why['cause']}")
     if why["cause"] is not None:
         rig.timeline.append(Event(why["at_us"], "cut", within_us=200_000))
-    client.request("stop")
-    time.sleep(0.5)
+    t.stop_for(client, 0.5)
     t.judge(rig, pair_limit_us=GAP_US)  # another program may run between the frames of the two wheels; each wheel's gap is judged anyway
 
 
@@ -87,26 +82,21 @@ def row27_disk_full(t):
     rig = t.rig()
     folder = rig.path("records")
     full_disk(folder)
-    rig.settings.setdefault("record", {})["directory"] = folder
-    rig.write_config()
+    rig.configure(record={"directory": folder})
     try:
-        rig.start_gateway()
-        client = rig.client()
+        client = rig.connect_to_new()
         for remount in (None, "ro"):
             if remount:
                 subprocess.run(["mount", "-o", "remount,ro", folder], check=True)
-            t.arm(client)
-            stream = Streamer(client, 300, 300, 0.02)
-            time.sleep(0.7)
+            stream = t.start_driving(client, 300, 300, 0.7, 0.02)
             rig.press()
             time.sleep(0.3)
             stream.stop()
             t.stopped_by(client, "estop_line")
             rig.release()
-            wait_reset(t, client)
+            t.reset(client)
             time.sleep(0.5)
-        t.arm(client)
-        t.drive_for(client, 200, 200, 0.5)
+        t.arm_and_drive(client, 200, 200, 0.5)
         t.judge(rig)
     finally:
         rig.gateway.end()
@@ -115,27 +105,24 @@ def row27_disk_full(t):
 
 @kernel_test("processes of other users hold the names of the lock: the gateway starts, after a kill in motion too, and only once", "host", 30)
 def row30_strangers(t):
-    rig, _, stream = driving(t)
+    rig, _, stream = t.driving()
     names = lock_names(rig.gateway_bus())
     killed_us = now_us()
     rig.kill_gateway(signal.SIGKILL)
     stream.stop()
     stranger = rig.stranger("listening", names[:1])
     rig.stranger("silent", names[1:])
-    rig.start_gateway(wheels=False, restart_hold=True)
-    observer = rig.client("observer")
+    observer = rig.connect_to_new(wheels=False, restart_hold=True, name="observer")
     time.sleep(0.3)
     sent = rig.bus.setpoints(killed_us + 20_000)
     t.check(sent and not any(speed for _, _, speed in sent), f"zeros and nothing but zeros: {sent[:4]}")
     text = rig.gateway.text()
     t.check(f"process {stranger.child.pid} of user 65534 holds @{names[0]}" in text, f"who holds it: {text[:600]}")
     os.mkdir(rig.path("elsewhere"))
-    other = Process(rig.gateway_command("--socket", rig.path("elsewhere/gateway.sock")), rig.path("second.out"))
-    rig.processes.append(other)
+    other = rig.launch(rig.gateway_command("--socket", rig.path("elsewhere/gateway.sock")), "second.out")
     t.check(other.wait(5) == 69, f"a second gateway is refused: {other.text()[-300:]}")
-    t.check(rig.wait_status(observer, lambda s: s["state"] == "listening", 4), "listening after the hold")
-    t.arm(observer)
-    t.drive_for(observer, 200, 200, 0.4)
+    t.silence(rig, observer, text="listening after the hold")
+    t.arm_and_drive(observer, 200, 200, 0.4)
     t.judge(rig)
 
 
@@ -151,19 +138,16 @@ def row30_gives_way(t):
     command[command.index(rig.path("gateway.conf"))] = os.path.join(folder, "gateway.conf")
     command[0] = shutil.copy(command[0], folder)  # The build may be in a folder that only its owner may enter, as in /root.
     os.chown(os.path.join(folder, "gateway.conf"), STRANGER, STRANGER)
-    theirs = Process(command, rig.path("theirs.out"), become_stranger)
-    rig.processes.append(theirs)
+    theirs = rig.launch(command, "theirs.out", become_stranger)
     wait_connect(os.path.join(folder, "gateway.sock"), theirs).close()
     rig.start_gateway()
     t.check(f"process {theirs.child.pid} of user 65534 holds" in rig.gateway.text(), f"named: {rig.gateway.text()[-400:]}")
     t.check(theirs.wait(5) == 69, "it ends")
     t.check("has priority over this one" in theirs.text(), f"and prints the reason: {theirs.text()[-300:]}")
-    again = Process(command, rig.path("again.out"), become_stranger)
-    rig.processes.append(again)
+    again = rig.launch(command, "again.out", become_stranger)
     t.check(again.wait(5) == 69 and "another gateway already serves" in again.text(), f"nor starts: {again.text()[-300:]}")
     client = rig.client()
-    t.arm(client)
-    t.drive_for(client, 200, 200, 0.4)
+    t.arm_and_drive(client, 200, 200, 0.4)
     t.judge(rig)
 
 
@@ -171,32 +155,28 @@ def row30_gives_way(t):
 def row30_after_a_crash(t):
     rig, _client = t.running()
     rig.kill_gateway(signal.SIGKILL)
-    rig.start_gateway()
-    again = rig.client()
-    t.arm(again)
-    t.drive_for(again, 200, 200, 0.5)
+    again = rig.connect_to_new()
+    t.arm_and_drive(again, 200, 200, 0.5)
     t.judge(rig)
 
 
 @kernel_test("killed in motion; a gateway with its socket elsewhere finds the marker: zeros first", "host", 25)
 def row25_marker_found_elsewhere(t):
-    rig, _client, stream = driving(t)
+    rig, _client, stream = t.driving()
     killed_us = now_us()
     rig.kill_gateway(signal.SIGKILL)
     stream.stop()
     os.mkdir(rig.path("elsewhere"))
     rig.socket_name = "elsewhere/gateway.sock"
-    rig.start_gateway(wheels=False, restart_hold=True)
-    observer = rig.client("observer")
+    observer = rig.connect_to_new(wheels=False, restart_hold=True, name="observer")
     time.sleep(0.3)
     sent = rig.bus.setpoints(killed_us + 20_000)
     t.check(sent and not any(speed for _, _, speed in sent), f"zeros and nothing but zeros: {sent[:4]}")
     t.check(observer.request("status")["cause"] == "restart", "the cause is the restart")
-    t.check(rig.wait_status(observer, lambda s: s["state"] == "listening", 4), "listening after the hold")
-    t.arm(observer)
-    t.drive_for(observer, 200, 200, 0.4)
+    t.silence(rig, observer, text="listening after the hold")
+    t.arm_and_drive(observer, 200, 200, 0.4)
     observer.request("stop")
-    t.check(rig.wait_status(observer, lambda s: s["state"] == "listening", 4), "silence")
+    t.silence(rig, observer)
     rig.gateway.end()
     silent_us = now_us()
     rig.start_gateway()

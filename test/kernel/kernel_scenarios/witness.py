@@ -8,7 +8,6 @@ import time
 
 from can_bus import FRAME, open_raw
 from catalogue import Entry, kernel_test
-from client import Streamer
 from guest_run import GuestRun, attempt_of, run_one
 from judge_log import LEFT, RIGHT
 from kernel_rig import ESTOP_US, LEVEL_US, PRESS_LATE_US, TICK_US, VcanRig, machine_late
@@ -42,10 +41,7 @@ def drive_while(halt, afterwards=None):
     """A test that drives on while a process or the machine is stopped."""
 
     def seeded(t):
-        rig, client = t.running()
-        t.arm(client)
-        stream = Streamer(client, 300, 300)
-        time.sleep(0.4)
+        rig, _, stream = t.driving(seconds=0.4, every=0.05)
         halt(t, rig)
         time.sleep(0.3)
         refusal = stream.stop()
@@ -131,10 +127,7 @@ def plumbing_machine_no_excuse(t):
 
 def late_press(t, delay):
     """A press in motion while `delay(rig)` stops a process or the machine for LATE_S. Returns (latencies from edge and level, whether the machine was late)."""
-    rig, client = t.running()
-    t.arm(client)
-    stream = Streamer(client, 300, 300)
-    time.sleep(0.5)
+    rig, _, stream = t.driving(seconds=0.5, every=0.05)
     undo = delay(rig)
     edge_us = rig.press()
     undo()

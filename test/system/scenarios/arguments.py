@@ -227,8 +227,7 @@ def row29_type_not_set(t):
         rig = t.rig()
         del rig.settings["wheels"][missing]
         rig.write_config()
-        rig.start_gateway()
-        client = rig.client()
+        client = rig.connect_to_new()
         refusal = client.arm()
         t.expect(refusal, error)
         t.check(f"{missing} not configured" in refusal["message"], f"the message names the key: {refusal['message']}")

@@ -25,7 +25,7 @@ def nominal_drive_and_turn(t):
     t.check(status["left"]["speed_mm_s"] < -150 and status["right"]["speed_mm_s"] > 150, "the machine turns on the spot")
     t.expect(client.request("stop"))
     t.check(client.request("status")["state"] == "stopping", "stop leads to stopping")
-    t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 4), "listening again after the hold")
+    t.silence(rig, client, text="listening again after the hold")
     why = t.stopped_by(client, "client_stop", "listening")
     t.check(not why["latched"], "a stop does not latch")
     truth = json.loads(rig.sim.ask("status"))
@@ -42,7 +42,7 @@ def arm_moves_nothing(t):
     t.check(rig.wait_status(client, lambda s: s["state"] == "stopping", 2), "the lease ends without a drive")
     t.figure(f"lease ended after {time.monotonic() - begin:.2f} s")
     t.check(0.8 <= time.monotonic() - begin <= 1.3, "the first lease is one second", True)
-    t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 3), "then nothing is sent")
+    t.silence(rig, client, 3, "then nothing is sent")
     t.stopped_by(client, "lease_lost", "listening")
     t.rule(not any(speed for _, _, speed in rig.bus.setpoints()), "nothing but zeros")
     t.judge(rig, moves=False)
@@ -61,8 +61,7 @@ def limits_and_twist(t):
     reply = client.request("twist", v_mm_s=300, yaw_mrad_s=2000)
     t.check(reply["ok"] and (reply["left_mm_s"], reply["right_mm_s"], reply["limited"]) == (-120, 420, True), f"turned by 1 rad/s, in the same curve: {reply}")
     t.drive_for(client, 165, 435, 0.8)
-    client.request("stop")
-    time.sleep(0.6)
+    t.stop_for(client, 0.6)
     t.judge(rig)
 
 
@@ -88,7 +87,7 @@ def other_configuration(t):
         left and all(frame.data[3:5] == (-1000).to_bytes(2, "big", signed=True) for frame in left[2:]), "speed and current are negated for the mirrored wheel"
     )
     client.request("stop")
-    t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 4), "nothing is sent at the end")
+    t.silence(rig, client, text="nothing is sent at the end")
     t.judge(rig)
 
 
@@ -121,15 +120,12 @@ def force_offset_and_tare(t):
 
 @scenario("unknown is null, never zero", 3)
 def unknown_is_null(t):
-    rig = t.rig()
-    rig.sim.ask("power off")
-    rig.start_gateway(wheels=False)
-    client = rig.client()
+    rig, client = t.running(sim=("power off",), wheels=False)
     status = client.request("status")
     for side in ("left", "right"):
         for key in ("speed_rpm", "speed_mm_s", "battery_dV", "ticks", "force_net_mN", "applied_mm_s", "speed_age_ms"):
             t.check(status[side][key] is None, f"{side} {key} is {status[side][key]} although it was never received")
     t.expect(client.arm(), "wheel_lost")
     rig.sim.ask("power on")
-    t.check(rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"], 8), "online once they have power")
+    t.check(rig.wait_at_rest(client, 8), "online once they have power")
     t.judge(rig, moves=False)

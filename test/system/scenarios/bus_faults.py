@@ -6,7 +6,6 @@ import struct
 import time
 
 from bus import EXTENDED, REMOTE, ERROR
-from client import Streamer
 from harness import now_us
 from judge_log import LEFT, RIGHT, Event
 from scenario import scenario
@@ -15,22 +14,8 @@ FOREIGN_ZERO = struct.pack(">Bhh", 1, 0, 2000)
 SETPOINT = struct.pack(">Bhh", 1, 300, 2000)
 
 
-def wait_reset(t, client, seconds=6.0):
-    end, reasons = time.monotonic() + seconds, []
-    while True:
-        reply = client.request("reset")
-        if reply["ok"] or time.monotonic() > end:
-            t.expect(reply)
-            return reasons
-        reasons.append(reply["error"])
-        time.sleep(0.05)
-
-
 def power_cut(t, seconds, speed):
-    rig, client = t.running({"drive": {"accel_mm_s2": 2000}})
-    t.arm(client)
-    stream = Streamer(client, speed, speed)
-    time.sleep(1.0)
+    rig, client, stream = t.driving({"drive": {"accel_mm_s2": 2000}}, speed=speed, seconds=1.0, every=0.05)
     rig.fault("power off", within_ms=70)
     rig.note("dead")
     time.sleep(0.3)
@@ -42,7 +27,7 @@ def power_cut(t, seconds, speed):
     back_us = now_us()
     rig.sim.ask("power on")
     rig.timeline.append(Event(back_us, "alive", now_us()))
-    t.check(rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"], 10), "the wheels are online again")
+    t.check(rig.wait_at_rest(client, 10), "the wheels are online again")
     time.sleep(0.5)
     late = [(at, side, value) for at, side, value in rig.bus.setpoints(back_us)]
     moving = [entry for entry in late if entry[2]]
@@ -51,12 +36,10 @@ def power_cut(t, seconds, speed):
         f"at most one old frame per wheel came out: {[(at - back_us, side, value) for at, side, value in moving]}",
     )
     t.check(max(abs(rig.bus.speed_rpm(side)) for side in (0, 1)) <= 2, "the wheels are at standstill")
-    wait_reset(t, client)
+    t.reset(client)
     t.figure(f"{why['cause']}, {len(moving)} old and {len(late) - len(moving)} zero frames afterwards")
-    t.arm(client)
-    t.drive_for(client, 200, 200, 0.5)
-    client.request("stop")
-    time.sleep(0.4)
+    t.arm_and_drive(client, 200, 200, 0.5)
+    t.stop_for(client, 0.4)
     judge = t.judge(rig)
     t.figure(f"residual {judge.residual}")
 
@@ -73,10 +56,7 @@ def row18_power_cut_short(t):
 
 def foreign(t, can_id, data):
     """A setpoint of another process in motion."""
-    rig, client = t.running()
-    t.arm(client)
-    stream = Streamer(client, 300, 300, 0.02)
-    time.sleep(0.7)
+    rig, client, stream = t.driving()
     rig.note("cut", within_us=30_000)
     foreign_us = now_us()
     rig.bus.send(can_id, data)
@@ -89,7 +69,7 @@ def foreign(t, can_id, data):
         why["detail"] == can_id and str(can_id) in why["sentence"] and f"0x{can_id:03X}" in why["sentence"],
         f"why names the id: {why['detail']}, {why['sentence']}",
     )
-    reasons = wait_reset(t, client)
+    reasons = t.reset(client)
     t.check("cause_present" in reasons or "second_master" in reasons or "stale_command" in reasons, f"reset waits: {set(reasons)}")
     t.judge(rig)
 
@@ -107,10 +87,8 @@ def row19_foreign_zero(t):
 @scenario("a second master while stopping: latched", 5)
 def row19_second_master_stopping(t):
     rig, client = t.running()
-    t.arm(client)
-    t.drive_for(client, 300, 300, 0.7)
-    client.request("stop")
-    time.sleep(0.6)
+    t.arm_and_drive(client, 300, 300, 0.7)
+    t.stop_for(client, 0.6)
     rig.timeline.append(Event(now_us(), "cut", within_us=30_000))
     rig.bus.send(LEFT, FOREIGN_ZERO)
     time.sleep(0.1)
@@ -133,8 +111,7 @@ def row19_second_master_listening(t):
     t.check(any(e["event"] == "fault" and e["cause"] == "second_master" for e in client.collect(0.1)), "and the event comes")
     t.rule(not rig.bus.setpoints(), "nothing is sent")
     time.sleep(1.1)
-    t.arm(client)
-    t.drive_for(client, 200, 200, 0.5)
+    t.arm_and_drive(client, 200, 200, 0.5)
     t.judge(rig)
 
 
@@ -150,8 +127,7 @@ def row19_forged_error_frames(t):
     time.sleep(1.3)
     status = client.request("status")
     t.check(status["state"] == "listening", f"listening: {status['state']}, {status['cause']}")
-    t.arm(client)
-    t.drive_for(client, 200, 200, 0.5)
+    t.arm_and_drive(client, 200, 200, 0.5)
     t.figure(f"bus {client.request('status')['bus']['state']}")
     t.judge(rig)
 
@@ -167,9 +143,7 @@ def feed(rig, seconds, can_id, data):
 def row20_odd_frames(t):
     rig, client = t.running()
     before = client.request("status")["counters"]
-    t.arm(client)
-    stream = Streamer(client, 300, 300)
-    time.sleep(0.6)
+    stream = t.start_driving(client, 300, 300, 0.6)
     speed = struct.pack(">hh", 15, 0)
     rig.fault("mute left", "ramp", within_ms=80)
     muted_us, end, odd, short = now_us(), time.monotonic() + 0.3, 0, 0
@@ -191,32 +165,25 @@ def row20_odd_frames(t):
     feed(rig, 0.3, 256, bytes(8))
     t.check(client.request("status")["left"]["heard"], "a longer frame is accepted")
     rig.sim.ask("unmute left")
-    wait_reset(t, client)
+    t.reset(client)
     t.judge(rig)
 
 
 @scenario("odd frames on the setpoints' ids: no second master, nothing moves", 5)
 def row20_odd_setpoints(t):
-    rig, client = t.running()
-    t.arm(client)
-    stream = Streamer(client, 300, 300, 0.02)
-    time.sleep(0.7)
+    rig, client, stream = t.driving()
     rig.bus.send(LEFT | EXTENDED, SETPOINT)
     rig.bus.send(RIGHT | REMOTE, b"", 5)
     time.sleep(0.2)
     t.check(client.request("status")["state"] == "armed", "an extended frame is not ours, and no setpoint")
     stream.stop()
-    client.request("stop")
-    time.sleep(0.3)
+    t.stop_for(client, 0.3)
     t.judge(rig)
 
 
 @scenario("the bus disappears and returns: stop, found again, nothing moves", 9)
 def row15_bus_gone(t):
-    rig, client = t.running()
-    t.arm(client)
-    stream = Streamer(client, 300, 300)
-    time.sleep(0.7)
+    rig, client, stream = t.driving(every=0.05)
     first_bus = rig.bus
     rig.note("cut", within_us=60_000)
     rig.sim.process.signal(signal.SIGKILL)
@@ -230,8 +197,8 @@ def row15_bus_gone(t):
     rig.restart_sim(first_bus.frames)
     back_us = now_us()
     rig.note("alive")
-    t.check(rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"] and s["bus"]["state"] == "active", 6), "found again")
-    wait_reset(t, client)
+    t.check(rig.wait_at_rest(client, 6, active=True), "found again")
+    t.reset(client)
     time.sleep(0.3)
     late = rig.bus.setpoints(back_us)
     t.rule(not any(speed for _, _, speed in late), f"nothing but zeros after the return: {late[:4]}")

@@ -8,47 +8,51 @@ import json
 import time
 
 from bus import ERROR
-from client import Streamer
 from harness import now_us
 from judge_log import LEFT, RIGHT, Event
 from scenario import scenario
 
-from .bus_faults import wait_reset
 from .clients import driving_process
-from .process import driving
 
 
 def drive_again(t, rig, client, seconds=8):
     """Both wheels are online, reset is accepted, nothing moves without a command, and it drives."""
-    online_again = rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"] and s["bus"]["state"] == "active", seconds)
+    online_again = rig.wait_at_rest(client, seconds, active=True)
     if not t.check(online_again, f"online again: {client.request('status')['bus']}"):
         return
-    wait_reset(t, client)
-    t.arm(client)
-    t.drive_for(client, 200, 200, 0.5)
-    client.request("stop")
-    time.sleep(0.3)
+    t.reset(client)
+    t.arm_and_drive(client, 200, 200, 0.5)
+    t.stop_for(client, 0.3)
 
 
 def only_zeros(t, rig, since_us):
     """Nothing but zeros from then until the next arm."""
     armed = [event.t_us for event in rig.timeline if event.kind == "arm" and event.ok and event.t_us > since_us]
     until_us = min(armed, default=now_us())
-    moving = [(at - since_us, speed) for at, _, speed in rig.bus.setpoints(since_us) if speed and at < until_us]
+    late = [(at - since_us, speed) for at, _, speed in rig.bus.setpoints(since_us) if at < until_us]
+    moving = [frame for frame in late if frame[1]]
     t.measure("stale_frames", len(moving))
     t.rule(not moving, f"old frames after the bus came back: {moving[:6]}")
+    t.figure(f"{len(late)} zero frames after the fault ended")
+
+
+def judge_repaired(t, rig, client, repair):
+    """After `repair` the bus works again: it drives, and nothing old is sent before."""
+    repair()
+    back_us = now_us()
+    rig.note("alive")
+    drive_again(t, rig, client)
+    only_zeros(t, rig, back_us)
+    t.judge(rig)
 
 
 def bus_off(t, off, on):
     """`off` and `on` disconnect the controller from the bus and connect it again."""
-    rig, client, stream = driving(t)
+    rig, client, stream = t.driving()
     observer = rig.client("observer")
     observer.request("watch", topics=["bus", "stop"])
     begin_us = now_us()
-    off(rig)
-    done_us = now_us()
-    rig.timeline.append(Event(done_us, "dead"))
-    rig.timeline.append(Event(begin_us, "cut", within_us=done_us - begin_us + 30_000))
+    rig.cut_by(lambda: off(rig), 30)
     time.sleep(0.3)
     stream.stop()
     why = t.stopped_by(client, "bus_down")
@@ -58,12 +62,7 @@ def bus_off(t, off, on):
     t.check(not client.request("reset")["ok"], "no reset while bus-off")
     t.check(any(e["event"] == "bus" and e["state"] == "bus_off" for e in observer.collect(0.1)), "the event comes")
     t.check("bus-off" in rig.gateway.text().lower(), f"the log reports bus-off: {rig.gateway.text()[-300:]}")
-    on(rig)
-    back_us = now_us()
-    rig.note("alive")
-    drive_again(t, rig, client)
-    only_zeros(t, rig, back_us)
-    t.judge(rig)
+    judge_repaired(t, rig, client, lambda: on(rig))
 
 
 def bus_off_listening(t, off, on):
@@ -75,13 +74,12 @@ def bus_off_listening(t, off, on):
     on(rig)
     time.sleep(1.2)
     t.rule(not rig.bus.setpoints(), "nothing was sent")
-    t.arm(client)
-    t.drive_for(client, 200, 200, 0.5)
+    t.arm_and_drive(client, 200, 200, 0.5)
     t.judge(rig)
 
 
 def error_passive(t, passive, active):
-    rig, client, stream = driving(t)
+    rig, client, stream = t.driving()
     passive(rig)
     time.sleep(0.3)
     t.check(client.request("status")["bus"]["state"] == "passive", f"bus {client.request('status')['bus']}")
@@ -90,14 +88,13 @@ def error_passive(t, passive, active):
     time.sleep(0.3)
     t.check(client.request("status")["bus"]["state"] == "active", f"bus {client.request('status')['bus']}")
     t.check(stream.stop() is None, "the stream was not refused")
-    client.request("stop")
-    time.sleep(0.4)
+    t.stop_for(client, 0.4)
     t.judge(rig)
 
 
 def error_flood(t, errors, active):
     """`errors(rig, n)` makes the n-th part of the flood."""
-    rig, client, stream = driving(t)
+    rig, client, stream = t.driving()
     for number in range(50):  # Spends the lines that the log may print in one burst: how many are left depends on those of the start.
         errors(rig, number)
         time.sleep(0.005)
@@ -114,8 +111,7 @@ def error_flood(t, errors, active):
     t.check(client.request("status")["state"] == "armed", f"it drives on: {client.request('why').get('sentence')}")
     t.check(stream.stop() is None, "the stream was not refused")
     t.figure(f"{more} lines of log, {percent:.0f} % CPU")
-    client.request("stop")
-    time.sleep(0.4)
+    t.stop_for(client, 0.4)
     t.judge(rig)
 
 
@@ -135,22 +131,14 @@ def row16_bus_off_listening(t):
 
 def forged_end(t, forge):
     """While the controller is off the bus, another node sends error frames that report the opposite."""
-    rig, client, stream = driving(t)
-    begin_us = now_us()
-    rig.sim.ask("busoff on")
-    rig.timeline.append(Event(now_us(), "dead"))
-    rig.timeline.append(Event(begin_us, "cut", within_us=now_us() - begin_us + 30_000))
+    rig, client, stream = t.driving()
+    rig.cut_by(lambda: rig.sim.ask("busoff on"), 30)
     time.sleep(0.1)
     forge(rig)
     time.sleep(0.5)
     stream.stop()
     t.check(client.request("status")["bus"]["state"] == "bus_off", f"the forged frames have no effect: {client.request('status')['bus']}")
-    rig.sim.ask("busoff off")
-    back_us = now_us()
-    rig.note("alive")
-    drive_again(t, rig, client)
-    only_zeros(t, rig, back_us)
-    t.judge(rig)
+    judge_repaired(t, rig, client, lambda: rig.sim.ask("busoff off"))
 
 
 @scenario("bus-off, and forged error frames that report its end: ignored, and no send remains stalled", 10)
@@ -182,12 +170,7 @@ def row16_error_flood(t):
 
 def held_up(t, words, seconds, causes):
     """The bus holds our frames for that long; what was held comes out as one old frame per wheel at most, its zero behind it."""
-    rig = t.rig({"drive": {"accel_mm_s2": 2000}})
-    rig.start_gateway()
-    client = rig.client()
-    t.arm(client)
-    stream = Streamer(client, 600, 600, 0.02)
-    time.sleep(0.8)
+    rig, client, stream = t.driving({"drive": {"accel_mm_s2": 2000}}, speed=600, seconds=0.8)
     rig.fault(f"{words} on" if words == "stall" else f"{words} off", within_ms=70)
     rig.note("dead")
     time.sleep(seconds)
@@ -244,8 +227,7 @@ def row21_babble_high(t):
     t.check(client.request("status")["state"] == "armed", f"it drives on: {client.request('why').get('sentence')}")
     t.figure(f"{len([1 for frame in rig.bus.frames if frame.id == 0x600]) / 3:.0f} foreign frames/s, load {load} permille")
     time.sleep(0.1)
-    client.request("stop")
-    time.sleep(0.6)
+    t.stop_for(client, 0.6)
     rig.take_events(driver)
     forget(t, rig, 0x600)
     t.judge(rig)
@@ -253,7 +235,7 @@ def row21_babble_high(t):
 
 @scenario("a babbling node with the lowest id on a full bus: send_stalled, latched; from zero afterwards", 7, native="a flood")
 def row21_babble_low(t):
-    rig, client, stream = driving(t)
+    rig, client, stream = t.driving()
     rig.fault("babble 001 100 on", within_ms=70)
     rig.note("dead")
     time.sleep(0.5)

@@ -5,7 +5,7 @@ import signal
 import socket
 import time
 
-from client import Closed, Streamer
+from client import Closed
 from harness import now_us
 from judge_log import Event
 from scenario import scenario
@@ -31,7 +31,7 @@ def row01_client_killed(t):
     ms = t.first_after(rig, killed_us, lambda speed: speed < 300, "the ramp begins", 60) if not time.sleep(0.3) else None
     t.figure(f"ramp after {ms or 0:.0f} ms")
     t.stopped_by(client, "client_gone", "stopping")
-    t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 4), "silence")
+    t.silence(rig, client)
     rig.take_events(process)
     t.judge(rig)
 
@@ -78,7 +78,7 @@ def row03_client_never_reads(t):
         rig.timeline.append(Event(observer.request("why")["at_us"], "gone"))
     t.check(worst_ms < 50, f"another client waited {worst_ms:.1f} ms for its answer", True)
     t.figure(f"others answered within {worst_ms:.1f} ms, dropped after {time.monotonic() - begin:.1f} s")
-    t.check(rig.wait_status(observer, lambda s: s["state"] == "listening", 5), "stopped, then nothing is sent")
+    t.silence(rig, observer, 5, "stopped, then nothing is sent")
     t.judge(rig)
 
 
@@ -88,9 +88,7 @@ def row04_two_clients(t):
     first.name = "first"
     second = rig.client("second")
     first.request("watch", topics=["lease", "stop"])
-    t.arm(first)
-    stream = Streamer(first, 300, 300)
-    time.sleep(0.8)
+    stream = t.start_driving(first, 300, 300, 0.8)
     t.expect(second.drive(0, 0), "not_holder")
     refusal = second.arm()
     t.expect(refusal, "busy")
@@ -135,15 +133,14 @@ def takeover_at_rest(t):
 def row06_reconnect_moves_nothing(t):
     rig, observer = t.running()
     client = rig.client("driver")
-    t.arm(client)
-    t.drive_for(client, 300, 300, 0.8)
+    t.arm_and_drive(client, 300, 300, 0.8)
     client.close(holder=True)
     again = rig.client("driver")
     again.request("status")
     again.request("watch", topics=["state"], rate_hz=50)
     again.collect(0.4)
     t.expect(again.drive(300, 300), "not_armed")
-    t.check(rig.wait_status(observer, lambda s: s["state"] == "listening", 4), "silence")
+    t.silence(rig, observer)
     t.arm(again)
     time.sleep(0.5)
     again.close(holder=True)
@@ -185,8 +182,7 @@ def row07_stale_command(t):
 @scenario("the holder may only pause within its lease", 6)
 def lease_is_exact(t):
     rig, client = t.running({"drive": {"lease_ms": 100}})
-    t.arm(client)
-    t.drive_for(client, 300, 300, 0.8, 0.03)
+    t.arm_and_drive(client, 300, 300, 0.8, 0.03)
     time.sleep(0.3)
     t.expect(client.drive(300, 300), "not_armed")
     t.stopped_by(client, "lease_lost", "stopping")

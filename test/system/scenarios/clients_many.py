@@ -19,7 +19,6 @@ from judge_log import Event
 from scenario import scenario
 
 from .arguments import call
-from .bus_faults import wait_reset
 
 FLOOD = "a flood"  # It never waits, so virtual time would stop.
 SPARE = 6  # Descriptors that are left when clients come in a crowd.
@@ -45,9 +44,7 @@ def read_some(sock, seconds=0.5):
 def row05_many_observers(t):
     rig, owner = t.running()
     path = rig.path("gateway.sock")
-    t.arm(owner)
-    stream = Streamer(owner, 300, 300)
-    time.sleep(0.6)
+    stream = t.start_driving(owner, 300, 300, 0.6)
     descriptors, memory_kB, cpu, begin = (rig.gateway.descriptors(), rig.gateway.resident_kB(), rig.gateway.cpu_seconds(), time.monotonic())
     for number in range(1000):
         sock = connect(path)
@@ -91,8 +88,7 @@ def row05_many_observers(t):
 @scenario("no descriptor left: no busy loop, the owner is undisturbed", 8, native="processor time")
 def row05_out_of_descriptors(t):
     rig = t.rig({"northbound": {"max_clients": 64}})
-    rig.start_gateway()
-    owner = rig.client("owner")
+    owner = rig.connect_to_new(name="owner")
     t.arm(owner)
     limit = rig.gateway.descriptors() + SPARE  # The number that the gateway itself needs depends on the bus and the e-stop line.
     resource.prlimit(rig.gateway.child.pid, resource.RLIMIT_NOFILE, (limit, limit))
@@ -108,9 +104,7 @@ def row05_out_of_descriptors(t):
     time.sleep(0.2)
     t.check(rig.gateway.descriptors() >= limit - 1, f"{rig.gateway.descriptors()} of {limit} descriptors are in use")
     t.check("there is no place for more" in rig.gateway.text(), "clients are refused, and the log reports it")
-    cpu, begin = rig.gateway.cpu_seconds(), time.monotonic()
-    time.sleep(1.5)
-    percent = 100 * (rig.gateway.cpu_seconds() - cpu) / (time.monotonic() - begin)
+    percent = 100 * rig.gateway.cpu_share(1.5)
     t.check(percent < 50, f"{percent:.0f} % CPU while no descriptor is left", True)
     t.figure(f"{percent:.0f} % CPU without a free descriptor")
     for sock in crowd:
@@ -127,8 +121,7 @@ def row05_out_of_descriptors(t):
 @scenario("sixty observers that send requests and watch without end: the e-stop does not wait for them", 14, native=FLOOD)
 def row05_sixty_observers(t):
     rig = t.rig({"northbound": {"max_clients": 64}})
-    rig.start_gateway()
-    owner = rig.client("owner")
+    owner = rig.connect_to_new(name="owner")
     crowd = [connect(rig.path("gateway.sock")) for _ in range(60)]
     over = threading.Event()
 
@@ -149,14 +142,12 @@ def row05_sixty_observers(t):
     thread.start()
     try:
         for _ in range(6):
-            t.arm(owner)
-            stream = Streamer(owner, 300, 300)
-            time.sleep(0.5)
+            stream = t.start_driving(owner, 300, 300, 0.5)
             rig.press()
             time.sleep(0.3)
             stream.stop()
             rig.release()
-            wait_reset(t, owner)
+            t.reset(owner)
     finally:
         over.set()
         thread.join()
@@ -183,14 +174,12 @@ def read_recording(path, name, pieces, over):
 @scenario("many watchers read a large recording, send requests and stop without end: no gap, and the stop counts", 12, native=FLOOD)
 def row05_watchers_and_recordings(t):
     rig = t.rig()
-    rig.settings["northbound"].update(watch_socket=rig.path("watch.sock"), watch_group="none")
-    rig.write_config()
+    rig.configure(northbound={"watch_socket": rig.path("watch.sock"), "watch_group": "none"})
     name = "stop-000001-client_stop.log"
     with open(rig.path(name), "wb") as file:
         file.write(os.urandom(LARGE))
     os.chmod(rig.path(name), 0o640)
-    rig.start_gateway()
-    owner = rig.client("owner")
+    owner = rig.connect_to_new(name="owner")
     over, pieces = threading.Event(), []
 
     def flood():
@@ -204,9 +193,7 @@ def row05_watchers_and_recordings(t):
 
     threads = [threading.Thread(target=read_recording, args=(rig.path("watch.sock"), name, pieces, over)) for _ in range(2)]
     threads += [threading.Thread(target=flood) for _ in range(4)]
-    t.arm(owner)
-    stream = Streamer(owner, 300, 300)
-    time.sleep(0.4)
+    stream = t.start_driving(owner, 300, 300, 0.4)
     for thread in threads:
         thread.start()
     time.sleep(3)
@@ -286,10 +273,8 @@ def stop_by(t, rig, path, verb):
 @scenario("every place of both sockets in use: stop and estop are carried out within 60 ms, no client is evicted", 25)
 def row33_stop_never_refused(t):
     rig = t.rig()
-    rig.settings["northbound"].update(watch_socket=rig.path("watch.sock"), watch_group="none", max_clients=PLACES)
-    rig.write_config()
-    rig.start_gateway()
-    owner = rig.client("owner")
+    rig.configure(northbound={"watch_socket": rig.path("watch.sock"), "watch_group": "none", "max_clients": PLACES})
+    owner = rig.connect_to_new(name="owner")
     paths = [rig.path("gateway.sock"), rig.path("watch.sock")]
     worst = 0
     for kind in ("idle", "poll", "reconnect"):
@@ -299,16 +284,14 @@ def row33_stop_never_refused(t):
         try:
             for path in paths:
                 for verb in FIRST_LINES:
-                    t.arm(owner)
-                    stream = Streamer(owner, 300, 300)
-                    time.sleep(0.6)
+                    stream = t.start_driving(owner, 300, 300, 0.6)
                     sent_us = stop_by(t, rig, path, verb)
                     slower = t.first_after(rig, sent_us, lambda mm_s: mm_s < 300, f"{verb} next to {kind}", STOP_MS)
                     worst = max(worst, slower or 0)
                     stream.stop()
                     if verb == "estop":
                         time.sleep(1.2)
-                        wait_reset(t, owner)
+                        t.reset(owner)
         finally:
             for flood in floods:
                 flood.kill()
@@ -337,18 +320,14 @@ def row33_iwheelctl_stops(t):
     rig = t.rig()
     os.makedirs(rig.path("watch"), mode=0o755)
     watch = rig.path("watch/gateway.sock")
-    rig.settings["northbound"].update(watch_socket=watch, watch_group="none", max_clients=PLACES)
-    rig.write_config()
-    rig.start_gateway()
-    owner = rig.client("owner")
+    rig.configure(northbound={"watch_socket": watch, "watch_group": "none", "max_clients": PLACES})
+    owner = rig.connect_to_new(name="owner")
     crowd = Crowd([rig.path("gateway.sock"), watch], {rig.path("gateway.sock"): 1}, False)
     away = rig.path("away")
     try:
         for moved in (None, rig.path("gateway.sock"), watch):
             for verb in (["stop"], ["estop", "a", "crowd"]):
-                t.arm(owner)
-                stream = Streamer(owner, 300, 300)
-                time.sleep(0.5)
+                stream = t.start_driving(owner, 300, 300, 0.5)
                 if moved:
                     os.rename(moved, away)
                 sent_us = now_us()
@@ -363,7 +342,7 @@ def row33_iwheelctl_stops(t):
                 t.check(stream.refusal is not None, f"{verb[0]} with {moved} away stopped no client")
                 if verb[0] == "estop":
                     time.sleep(1.2)
-                    wait_reset(t, owner)
+                    t.reset(owner)
         code, text = call(rig, "iwheelctl", "--socket", rig.path("gateway.sock"), "status")
         t.check(code == 1 and "too_many_clients" in text, f"other requests are refused: {code}: {text!r}")
     finally:

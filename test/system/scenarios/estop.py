@@ -9,25 +9,10 @@ import tempfile
 import threading
 import time
 
-from client import Streamer
-from harness import now_us
-from judge_log import Event
 from scenario import scenario
 
 PRESSES = 25
 WORST_US = 150_000  # of one press; the 99th percentile of all presses together is judged by the runner
-
-
-def reset(t, client, seconds=4.0):
-    """Repeats reset until the gateway accepts it. Returns the errors of the refusals."""
-    reasons, end = [], time.monotonic() + seconds
-    while True:
-        reply = client.request("reset")
-        if reply["ok"] or time.monotonic() > end:
-            t.expect(reply)
-            return reasons
-        reasons.append(reply["error"])
-        time.sleep(0.1)
 
 
 def presses(t, seed):
@@ -36,9 +21,7 @@ def presses(t, seed):
     rig, client = t.running()
     pusher = rig.client("watcher")
     for number in range(PRESSES):
-        t.arm(client)
-        stream = Streamer(client, chance.randrange(100, 600), chance.randrange(100, 600))
-        time.sleep(chance.uniform(0.1, 0.4))
+        stream = t.start_driving(client, chance.randrange(100, 600), chance.randrange(100, 600), chance.uniform(0.1, 0.4))
         rig.press()
         time.sleep(chance.uniform(0.02, 0.08))
         status = pusher.request("status")
@@ -49,7 +32,7 @@ def presses(t, seed):
         rig.release()
         time.sleep(chance.uniform(0.0, 0.05))
         t.rule(pusher.request("status")["state"] == "latched", f"press {number}: release alone must not unlatch")
-        reset(t, pusher)
+        t.reset(pusher, 4.0)
         if t.failures:
             break
     t.judge(rig, estop_limit_us=WORST_US)
@@ -68,25 +51,18 @@ for part in range(4):
 def row12_short_pulses(t):
     rig, client = t.running()
     for pulse_ms in (1, 2, 5, 10, 20):
-        t.arm(client)
-        stream = Streamer(client, 200, 200)
-        time.sleep(0.25)
-        t_us = now_us()
-        rig.sim.ask(f"estop pulse {pulse_ms}")
-        rig.timeline.append(Event(t_us, "press", now_us()))
+        stream = t.start_driving(client, 200, 200, 0.25)
+        rig.pressed_by(lambda: rig.sim.ask(f"estop pulse {pulse_ms}"))
         time.sleep(0.1)
         stream.stop()
         t.stopped_by(client, "estop_line")
-        reset(t, client)
+        t.reset(client, 4.0)
     t.judge(rig, estop_limit_us=WORST_US)
 
 
 @scenario("pressed at start: starts latched; reset while pressed refused; reset repeated counts once", 5)
 def row13_pressed_at_start(t):
-    rig = t.rig()
-    rig.sim.ask("estop press")
-    rig.start_gateway(wheels=False)
-    client = rig.client()
+    rig, client = t.running(sim=("estop press",), wheels=False)
     t.check(rig.wait_status(client, lambda s: s["state"] == "latched" and s["left"]["at_rest"] and s["right"]["at_rest"], 3), "latched from the start")
     t.stopped_by(client, "estop_line")
     refusal = client.arm()
@@ -96,7 +72,7 @@ def row13_pressed_at_start(t):
     rig.release()
     time.sleep(0.3)
     t.rule(client.request("status")["state"] == "latched", "release does not unlatch")
-    reset(t, client)
+    t.reset(client, 4.0)
     for _ in range(5):
         reply = client.request("reset")
         t.check(reply["ok"] and reply["state"] == "listening", f"repeated reset: {reply}")
@@ -111,20 +87,14 @@ def two_contacts(t):
     t.second = tempfile.TemporaryDirectory(prefix="iwheel-second-")  # removed with the test
     second = os.path.join(t.second.name, "button")
     rig = t.rig(sim_args=("--estop2", second))
-    rig.settings["estop"] = {"line": rig.estop_line(), "line2": f"unix:{second}", "estop_discrepancy_ms": 1000}
-    rig.write_config()
-    rig.start_gateway()
-    return rig, rig.client()
+    rig.configure(estop={"line": rig.estop_line(), "line2": f"unix:{second}", "estop_discrepancy_ms": 1000})
+    return rig, rig.connect_to_new()
 
 
 def press_contact(t, rig, client, number):
     """Arms, drives, presses one contact alone. The gateway stops and names the contact."""
-    t.arm(client)
-    stream = Streamer(client, 300, 300)
-    time.sleep(0.4)
-    t_us = now_us()
-    rig.sim.ask(f"contact {number} press")
-    rig.timeline.append(Event(t_us, "press", now_us()))
+    stream = t.start_driving(client, 300, 300, 0.4)
+    rig.pressed_by(lambda: rig.sim.ask(f"contact {number} press"))
     time.sleep(0.1)
     stream.stop()
     t.stopped_by(client, "estop_line")
@@ -145,7 +115,7 @@ def row11_two_contacts(t):
         time.sleep(0.1)
         t.expect(client.request("reset"), "estop_pressed")
         rig.sim.ask(f"contact {3 - number} release")
-        reset(t, client)
+        t.reset(client, 4.0)
         t.check(client.request("status")["estop"]["pressed_at"] == "neither", "both are released")
     t.judge(rig, estop_limit_us=WORST_US)
 
@@ -170,18 +140,16 @@ def row13_contact_stuck(t):
         time.sleep(0.1)
         t.check(not client.request("reset")["ok"], "no reset while both are pressed")
         rig.release()
-        reset(t, client)
+        t.reset(client, 4.0)
         t.check(client.request("status")["estop"]["state"] == "released", "the e-stop is released")
-    t.arm(client)
-    t.drive_for(client, 200, 200, 0.5)
+    t.arm_and_drive(client, 200, 200, 0.5)
     t.judge(rig, estop_limit_us=WORST_US)
 
 
 @scenario("one line as both contacts is refused at start", 2)
 def row29_contact_twice(t):
     rig = t.rig()
-    rig.settings["estop"] = {"line": rig.estop_line(), "line2": rig.estop_line()}
-    rig.write_config()
+    rig.configure(estop={"line": rig.estop_line(), "line2": rig.estop_line()})
     done = subprocess.run(rig.gateway_command(), capture_output=True, text=True, timeout=5, check=False)
     t.check(done.returncode == 78, f"exit code {done.returncode}")
     t.check("line and line2 are both" in done.stderr and "gateway.conf:" in done.stderr, f"names the keys: {done.stderr}")
@@ -190,13 +158,12 @@ def row29_contact_twice(t):
 @scenario("reset names the reason of a refusal: pressed, moving, commanded, just happened", 6)
 def reset_refusals(t):
     rig, client = t.running()
-    t.arm(client)
-    t.drive_for(client, 600, 600, 1.2)
+    t.arm_and_drive(client, 600, 600, 1.2)
     rig.press()
     t.expect(client.request("reset"), "estop_pressed")
     rig.release()
     time.sleep(0.02)
-    reasons = set(reset(t, client))
+    reasons = set(t.reset(client, 4.0))
     t.check(reasons & {"not_at_rest", "stale_command"}, f"reasons on the way: {reasons}")
     t.figure("refused for " + ", ".join(sorted(reasons)))
     t.expect(client.drive(100, 100), "not_armed")
@@ -209,16 +176,14 @@ def reset_refusals(t):
 @scenario("software e-stop by a client without the lease", 5)
 def software_estop(t):
     rig, owner = t.running()
-    t.arm(owner)
-    stream = Streamer(owner, 400, 400)
-    time.sleep(0.6)
+    stream = t.start_driving(owner, 400, 400, 0.6)
     guard = rig.client("guard")
     t.expect(guard.request("estop", reason="a person in the way"))
     time.sleep(0.1)
     stream.stop()
     why = t.stopped_by(guard, "estop_software")
     t.check("a person in the way" in why["sentence"], f"why has the reason: {why['sentence']}")
-    reset(t, guard)
+    t.reset(guard, 4.0)
     t.check(guard.request("status")["state"] == "listening", "reset leads to listening")
     time.sleep(0.3)
     t.judge(rig)
@@ -262,25 +227,18 @@ def row14_button_dies(t):
     rig = t.rig()
     rig.button = "own-button"
     button = Button(rig.path(rig.button))
-    rig.start_gateway()
-    client = rig.client()
-    t.arm(client)
-    stream = Streamer(client, 300, 300)
-    time.sleep(0.6)
-    t_us = now_us()
-    button.die()
-    rig.timeline.append(Event(t_us, "press", now_us()))
+    client = rig.connect_to_new()
+    stream = t.start_driving(client, 300, 300, 0.6)
+    rig.pressed_by(button.die)
     time.sleep(0.2)
     stream.stop()
     t.stopped_by(client, "estop_line")
-    cpu, begin = rig.gateway.cpu_seconds(), time.monotonic()
-    time.sleep(1.0)
-    t.check((rig.gateway.cpu_seconds() - cpu) / (time.monotonic() - begin) < 0.5, "no busy loop without a button", True)
+    t.check(rig.gateway.cpu_share(1.0) < 0.5, "no busy loop without a button", True)
     t.expect(client.request("reset"), "estop_pressed")
     button.open()
     t.check(rig.wait_status(client, lambda s: s["estop"]["state"] == "released", 3), "found again")
     t.rule(client.request("status")["state"] == "latched", "its return alone does not unlatch")
-    reset(t, client)
+    t.reset(client, 4.0)
     button.die()
     time.sleep(0.2)
     t.check(client.request("status")["state"] == "latched", "a button that disappears while listening latches too")
@@ -289,14 +247,11 @@ def row14_button_dies(t):
 
 @scenario("without an e-stop: may arm, and is warned", 4)
 def no_estop_line(t):
-    rig = t.rig(estop=False)
-    rig.start_gateway()
-    client = rig.client()
+    rig, client = t.running(estop=False)
     reply = t.arm(client)
     t.check(any("e-stop" in warning or "estop" in warning for warning in reply.get("warnings", [])), f"arm warns: {reply.get('warnings')}")
     t.check(client.request("status")["estop"]["state"] == "none", "status reports none")
     t.check("e-stop" in rig.gateway.text().lower(), "the log reports it at start")
     t.drive_for(client, 200, 200, 0.5)
-    client.request("stop")
-    time.sleep(0.4)
+    t.stop_for(client, 0.4)
     t.judge(rig)

@@ -48,7 +48,7 @@ def frames_taken_together(t):
     t.check(watched >= APART * alone, f"{watched:.2f} wakes for a frame with a client that watches them, {alone:.2f} without", timing=True)
     t.figure(f"{alone:.2f} wakes for a frame, {driving:.2f} while driving, {watched:.2f} watched")
     client.request("stop")
-    t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 4), "silence")
+    t.silence(rig, client)
     t.judge(rig)
 
 

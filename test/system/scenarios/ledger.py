@@ -5,7 +5,6 @@ import time
 
 from scenario import scenario
 
-from .bus_faults import wait_reset
 from .wheels import fault_while_driving
 
 
@@ -26,8 +25,7 @@ def confirm_by_the_operator(t):
     assumptions = client.request("status")["ledger"]
     t.check(assumptions["wheel_radius"]["state"] == "confirmed", "the radius stays confirmed after a refused value")
     t.rule(not rig.bus.setpoints(), "none of these requests sends a setpoint")
-    t.arm(client)
-    t.drive_for(client, 150, 150, 0.3)
+    t.arm_and_drive(client, 150, 150, 0.3)
     t.judge(rig)
 
 
@@ -56,7 +54,7 @@ def confirm_how_and_track(t):
     t.expect(turn, "denied")
     t.check("the operator found 600 by a tape" in turn["message"] and "track_mm" in turn["message"], f"why: {turn}")
     client.request("stop")
-    t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 5), "at standstill")
+    t.silence(rig, client, 5, "at standstill")
     client.request("twist", v_mm_s=0, yaw_mrad_s=300)
     t.expect(client.arm(), "stale_command")
     t.expect(client.request("confirm", item="track"))
@@ -67,7 +65,7 @@ def confirm_how_and_track(t):
 def contradicted_sign_refuses_arm(t):
     rig, client, _ = fault_while_driving(t, "sign both swapped", "feedback_sign", 420)
     rig.sim.ask("sign both normal")
-    wait_reset(t, client)
+    t.reset(client)
     # The wheel that is judged first stops both, which ends the comparison of the other one.
     assumptions = client.request("status")["ledger"]
     signs = [name for name in ("feedback_sign_left", "feedback_sign_right") if assumptions[name]["state"] == "contradicted"]
@@ -77,8 +75,7 @@ def contradicted_sign_refuses_arm(t):
     t.expect(client.arm(), "denied")
     for name in signs:
         t.expect(client.request("confirm", item=name))
-    t.arm(client)
-    t.drive_for(client, 150, 150, 0.3)
+    t.arm_and_drive(client, 150, 150, 0.3)
     t.judge(rig)
 
 
@@ -87,8 +84,7 @@ def ledger_by_driving(t):
     rig, client = t.running()
     client.request("watch", topics=["state"], rate_hz=1)
     time.sleep(2.6)  # Two seconds at standstill first: units and offset.
-    t.arm(client)
-    t.drive_for(client, 500, 400, 4.5)
+    t.arm_and_drive(client, 500, 400, 4.5)
     status = client.request("status")
     states = {name: (entry["state"], entry["evidence"]) for name, entry in status["ledger"].items()}
     for item in (
@@ -112,13 +108,8 @@ def ledger_by_driving(t):
 
 @scenario("another gear, another byte order, other lengths: contradicted, and values that depend on it are not reported", 22)
 def ledger_contradicted_by_driving(t):
-    rig = t.rig()
-    for command in ("gear both 3", "pose reversed", "padding on"):
-        rig.sim.ask(command)
-    rig.start_gateway()
-    client = rig.client()
-    t.arm(client)
-    t.drive_for(client, 600, 500, 9)
+    rig, client = t.running(sim=("gear both 3", "pose reversed", "padding on"))
+    t.arm_and_drive(client, 600, 500, 9)
     status = client.request("status")
     for item in ("gear_ratio", "pose_byte_order", "dlc"):
         entry = status["ledger"][item]
@@ -137,10 +128,7 @@ def ledger_contradicted_by_driving(t):
 
 @scenario("tare: refused while nothing is known, under unrest, under load and in motion, each with its reason", 24)
 def tare_refused_with_the_reason(t):
-    rig = t.rig(sim_args=("--uptime", "100"))
-    rig.sim.ask("load both 60")
-    rig.start_gateway()
-    client = rig.client()
+    rig, client = t.running(sim_args=("--uptime", "100"), sim=("load both 60",))
 
     def refused(error, words):
         reply = client.request("tare", side="left")
@@ -168,11 +156,10 @@ def tare_refused_with_the_reason(t):
     rig.sim.ask("raw left auto")
     rig.sim.ask("zero left 12.3")
     time.sleep(2.6)
-    t.arm(client)
-    t.drive_for(client, 200, 200, 1)
+    t.arm_and_drive(client, 200, 200, 1)
     refused("not_at_rest", "turned within the last two seconds")
     client.request("stop")
-    t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 6), "silence")
+    t.silence(rig, client, 6)
     rig.sim.ask("mute left")
     time.sleep(0.6)
     refused("wheel_lost", "has not sent force")

@@ -8,19 +8,13 @@ import struct
 import threading
 import time
 
-from client import Streamer
-from harness import Process, now_us
+from harness import now_us
 from judge_log import LEFT, RIGHT, Event
 from scenario import scenario
 
-from .bus_faults import wait_reset
-
 
 def crash(t, number):
-    rig, client = t.running()
-    t.arm(client)
-    stream = Streamer(client, 400, 400)
-    time.sleep(0.8)
+    rig, _, stream = t.driving(speed=400, seconds=0.8, every=0.05)
     rig.kill_gateway(number)
     killed_us = now_us()
     stream.stop()
@@ -37,11 +31,10 @@ def crash(t, number):
     t.figure(f"answers after {answered_ms:.0f} ms, zeros {(again[0][0] - killed_us) / 1000 if again else 0:.0f} ms after the kill")
     t.check(observer.request("status")["cause"] == "restart", "the cause is the restart")
     t.expect(observer.drive(300, 300), "not_armed")
-    t.check(rig.wait_status(observer, lambda s: s["state"] == "listening", 4), "listening after the hold")
-    t.arm(observer)
-    t.drive_for(observer, 200, 200, 0.4)
+    t.silence(rig, observer, text="listening after the hold")
+    t.arm_and_drive(observer, 200, 200, 0.4)
     observer.request("stop")
-    t.check(rig.wait_status(observer, lambda s: s["state"] == "listening", 4), "silence")
+    t.silence(rig, observer)
     observer.close()
     silent_us = now_us()
     rig.kill_gateway(number)
@@ -59,19 +52,17 @@ def row25_killed(t):
 @scenario("after_stop = hold: zeros until release, through a reset and a kill -9", 14)
 def hold_until_release(t):
     rig, client = t.running({"drive": {"after_stop": "hold"}})
-    t.arm(client)
-    t.drive_for(client, 300, 300, 0.8)
+    t.arm_and_drive(client, 300, 300, 0.8)
     t.expect(client.request("estop"))
     time.sleep(4)
     t.check(client.request("status")["holding"], "a latch is held")
-    wait_reset(t, client)
+    t.reset(client)
     time.sleep(1)
     status = client.request("status")
     t.check(status["holding"] and status["state"] == "stopping", f"a reset ends the latch, not the hold: {status['state']}")
     rig.kill_gateway(signal.SIGKILL)
     client.close()
-    rig.start_gateway(wheels=False, restart_hold=True)
-    client = rig.client("again")
+    client = rig.connect_to_new(wheels=False, restart_hold=True, name="again")
     time.sleep(3)
     t.check(client.request("status")["holding"], "the next start resumes it")
     sent = [at for at, _, _ in rig.bus.setpoints(now_us() - 1_000_000)]
@@ -92,8 +83,7 @@ def row25_aborted(t):
 @scenario("restart after a crash, but another master drives: nothing is sent", 5)
 def row25_restart_beside_other_master(t):
     rig, client = t.running()
-    t.arm(client)
-    t.drive_for(client, 300, 300, 0.6)
+    t.arm_and_drive(client, 300, 300, 0.6)
     rig.kill_gateway(signal.SIGKILL)
     client.close()
     time.sleep(0.1)
@@ -131,10 +121,7 @@ class Foreign:
 
 
 def ended_by(t, number):
-    rig, client = t.running()
-    t.arm(client)
-    stream = Streamer(client, 400, 400)
-    time.sleep(0.9)
+    rig, _, stream = t.driving(speed=400, seconds=0.9, every=0.05)
     t_us = now_us()
     rig.timeline.append(Event(t_us, "stop", t_us))
     rig.gateway.signal(number)
@@ -169,13 +156,11 @@ def row25_sigint(t):
 @scenario("--listen-only never sends", 4)
 def listen_only(t):
     rig = t.rig()
-    rig.start_gateway("--listen-only")
-    client = rig.client()
+    client = rig.connect_to_new("--listen-only")
     t.expect(client.arm(), "listen_only")
     t.check(not client.drive(200, 200)["ok"], "drive is refused")
     client.request("estop", reason="test")
-    client.request("stop")
-    time.sleep(0.2)
+    t.stop_for(client, 0.2)
     rig.press()
     time.sleep(0.5)
     t.check(client.request("status")["listen_only"] is True, "status reports it")
@@ -188,17 +173,13 @@ def listen_only(t):
 def second_gateway(t, rig, *extra):
     """Starts another gateway on the same bus; returns its exit code and output."""
     command = rig.gateway_command(*extra)
-    other = Process(command, rig.path("second.out"))
-    rig.processes.append(other)
+    other = rig.launch(command, "second.out")
     return other.wait(3), other.text()
 
 
 @scenario("a second gateway on the same bus refuses and sends nothing", 5)
 def row30_two_gateways(t):
-    rig, client = t.running()
-    t.arm(client)
-    stream = Streamer(client, 250, 250)
-    time.sleep(0.4)
+    rig, client, stream = t.driving(speed=250, seconds=0.4, every=0.05)
     os.mkdir(rig.path("elsewhere"))
     for extra in ((), ("--socket", rig.path("other.sock")), ("--socket", rig.path("elsewhere/gateway.sock"))):
         code, text = second_gateway(t, rig, *extra)
@@ -222,8 +203,7 @@ def row28_socket_path(t):
         (lambda: os.mkdir(path), "a directory"),
     ):
         make()
-        gateway = Process(rig.gateway_command(), rig.path("refused.out"))
-        rig.processes.append(gateway)
+        gateway = rig.launch(rig.gateway_command(), "refused.out")
         code = gateway.wait(3)
         t.check(code not in (0, None), f"{what} in place of the socket: exit code {code}")
         t.check(path in gateway.text(), f"{what}: the message names the path: {gateway.text()[-200:]}")

@@ -8,7 +8,6 @@ import signal
 import time
 import zlib
 
-from client import Streamer
 from harness import children
 from scenario import scenario
 
@@ -35,8 +34,7 @@ def written(rig, needle, seconds=4.0):
 
 def restart(rig, number=signal.SIGTERM, **options):
     rig.kill_gateway(number)
-    rig.start_gateway(**options)
-    return rig.client()
+    return rig.connect_to_new(**options)
 
 
 def answered(rig, client):
@@ -97,9 +95,7 @@ def memory_of_another_configuration(t):
     t.expect(client.request("tare", side="left"))
     t.check(written(rig, '"wheel_radius"'), "written")
     time.sleep(1.3)
-    rig.settings["wheels"]["radius_mm"] = 180
-    rig.settings["left"] = {"force_unit": "dN"}
-    rig.write_config()
+    rig.configure(wheels={"radius_mm": 180}, left={"force_unit": "dN"})
     client = restart(rig)
     status = answered(rig, client)
     t.check(status["ledger"]["wheel_radius"]["state"] == "assumed", "the radius is open again")
@@ -112,20 +108,14 @@ def memory_of_another_configuration(t):
 
 @scenario("a contradiction stays over a restart, until the operator resolves it", 16)
 def memory_of_a_contradiction(t):
-    rig = t.rig()
-    rig.sim.ask("unit left dN")
-    rig.start_gateway()
-    client = rig.client()
+    rig, client = t.running(sim=("unit left dN",))
     status = rig.wait_status(client, lambda s: s["left"]["force_validity"] == "unit_contradicted", 6)
     t.check(status and status["ledger"]["force_unit_left"]["disabled"], "the unit is contradicted")
     t.check(written(rig, '"contradicted"'), "written")
     rig.kill_gateway(signal.SIGTERM)
-    rig.sim.end()
-    rig.sim = type(rig.sim)(rig, ("--uptime", "100"))  # No offset frames any more, so the gateway cannot find it again.
-    rig.bus = rig.listen(rig.bus.frames)
+    rig.restart_sim(rig.bus.frames, ("--uptime", "100"))  # No offset frames any more, so the gateway cannot find it again.
     rig.sim.ask("unit left dN")
-    rig.start_gateway()
-    client = rig.client()
+    client = rig.connect_to_new()
     time.sleep(QUIET_S)
     status = client.request("status")
     left = status["left"]
@@ -182,8 +172,7 @@ def memory_that_is_not_to_be_trusted(t):
         spoil(path)
         with open(path, "rb") as file:
             spoilt = file.read()
-        rig.start_gateway()
-        client = rig.client()
+        client = rig.connect_to_new()
         answered(rig, client)
         status = client.request("status")
         t.check(status["ledger"]["wheel_radius"]["state"] == "assumed", "nothing of it is used")
@@ -205,10 +194,8 @@ def memory_without_a_place(t):
     folder = os.path.join(place, "records")
     with open(place, "w", encoding="ascii"):
         pass  # A file in place of a directory, so the gateway cannot make its file in it.
-    rig.settings["record"] = {"directory": folder}
-    rig.write_config()
-    rig.start_gateway()
-    client = rig.client()
+    rig.configure(record={"directory": folder})
+    client = rig.connect_to_new()
     status = answered(rig, client)
     t.check(status["memory"]["state"] == "failed" and status["memory"]["reason"], f"memory {status['memory']}")
     t.check("set [record] directory" in rig.gateway.text(), "the log has cause and fix")
@@ -216,9 +203,7 @@ def memory_without_a_place(t):
     os.remove(place)
     os.makedirs(folder)
     t.check(written(rig, '"wheel_radius"', 13), "stored as soon as there is a place")
-    t.arm(client)
-    stream = Streamer(client, 300, 300, 0.02)
-    time.sleep(0.5)
+    stream = t.start_driving(client, 300, 300, 0.5, 0.02)
     os.kill(store_process(rig.gateway), signal.SIGKILL)
     client.request("confirm", item="mount_sign_left")
     time.sleep(1.5)

@@ -15,21 +15,11 @@ from harness import hook_library, now_us
 from judge_log import Event
 from scenario import scenario
 
-from .bus_faults import wait_reset
 
 STOPS_S = (0.15, 0.25, 0.45, 0.7, 1.5, 3.0)
 F_SETPIPE_SZ = 1031
 WATCHDOG_MS = 400
 SEEN_US = 40_000  # the hook reads an order with the next command, 20 ms later
-
-
-def driving(t, config=None, speed=300, **options):
-    """A rig that drives: rig, client, stream."""
-    rig, client = t.running(config, **options)
-    t.arm(client)
-    stream = Streamer(client, speed, speed, 0.02)
-    time.sleep(0.7)
-    return rig, client, stream
 
 
 # Row 24: the process is stopped ------------------------------------------------------------------------------------------
@@ -48,7 +38,7 @@ def from_zero(t, rig, back_us, what):
 
 def stop_process(t, seconds):
     """The gateway's process is stopped in motion for that long (SIGSTOP), while its client drives on."""
-    rig, client, stream = driving(t, {"drive": {"lease_ms": 500, "accel_mm_s2": 2000, "decel_mm_s2": 5000}}, speed=500)
+    rig, client, stream = t.driving({"drive": {"lease_ms": 500, "accel_mm_s2": 2000, "decel_mm_s2": 5000}}, speed=500)
     client.timeout = seconds + 3
     rig.note("cut", within_us=int(seconds * 1e6) + 60_000)
     rig.note("dead")
@@ -79,7 +69,7 @@ for duration in STOPS_S:
 
 @scenario("the gateway's process is stopped for 70 ms: it drives on without a burst", 4)
 def row24_stopped_70_ms(t):
-    rig, client, stream = driving(t)
+    rig, client, stream = t.driving()
     rig.gateway.signal(signal.SIGSTOP)
     time.sleep(0.07)
     back_us = now_us()
@@ -88,8 +78,7 @@ def row24_stopped_70_ms(t):
     t.check(stream.stop() is None, f"it drives on: {stream.refusal}")
     burst = len([at for at, _, _ in rig.bus.setpoints(back_us) if at < back_us + 10_000])
     t.check(burst <= 4, f"{burst} setpoints in the first 10 ms")
-    client.request("stop")
-    time.sleep(0.4)
+    t.stop_for(client, 0.4)
     t.judge(rig)
 
 
@@ -138,8 +127,7 @@ def stuck(t, where):
     """One part of the cycle never returns; the service manager receives no notification any more and kills the gateway."""
     rig = t.rig()
     watchdog = Watchdog(rig.path("notify"))
-    rig.start_gateway(setup=hooked(rig, watchdog))
-    client = rig.client()
+    client = rig.connect_to_new(setup=hooked(rig, watchdog))
     t.arm(client)
     stream = Streamer(client, 400, 400, 0.02)
     words = watchdog.receive(1.2)
@@ -158,12 +146,11 @@ def stuck(t, where):
     stream.stop()
     os.unlink(rig.path("hook"))
     killed_us = now_us()
-    rig.start_gateway(wheels=False, restart_hold=True)
-    observer = rig.client("observer")
+    observer = rig.connect_to_new(wheels=False, restart_hold=True, name="observer")
     time.sleep(0.3)
     again = rig.bus.setpoints(killed_us)
     t.check(again and not any(speed for _, _, speed in again), f"restarted, zeros and nothing else: {again[:3]}")
-    t.check(rig.wait_status(observer, lambda s: s["state"] == "listening", 4), "listening after the hold")
+    t.silence(rig, observer, text="listening after the hold")
     t.figure(f"fed every {gap_ms:.0f} ms of {WATCHDOG_MS} ms")
     t.judge(rig)
 
@@ -186,11 +173,8 @@ def row26_stuck_button(t):
 @scenario("the machine was suspended for 2 s in motion: latched, from zero, with a fresh command", 5)
 def row24_suspended(t):
     rig = t.rig()
-    rig.start_gateway(setup=hooked(rig))
-    client = rig.client()
-    t.arm(client)
-    stream = Streamer(client, 300, 300, 0.02)
-    time.sleep(0.7)
+    client = rig.connect_to_new(setup=hooked(rig))
+    stream = t.start_driving(client, 300, 300, 0.7, 0.02)
     rig.note("cut", within_us=60_000)
     order(rig, "asleep 2")
     time.sleep(0.4)
@@ -198,9 +182,8 @@ def row24_suspended(t):
     from_zero(t, rig, client.request("why")["at_us"], "suspended for 2 s")  # The hook obeys at one of the next calls.
     t.stopped_by(client, "loop_hung")
     t.check(re.search("suspended for (199[0-9]|2000) ms", rig.gateway.text()), f"the log has it: {rig.gateway.text()[-300:]}")
-    wait_reset(t, client)
-    t.arm(client)
-    t.drive_for(client, 200, 200, 0.5)
+    t.reset(client)
+    t.arm_and_drive(client, 200, 200, 0.5)
     t.judge(rig)
 
 
@@ -224,20 +207,16 @@ def full_pipe():
 def row27_stderr_blocked(t):
     rig = t.rig()
     read_end, write_end = full_pipe()
-    rig.start_gateway("--log-level", "debug", setup=lambda: os.dup2(write_end, 2))
-    client = rig.client()
+    client = rig.connect_to_new("--log-level", "debug", setup=lambda: os.dup2(write_end, 2))
     for _ in range(3):
-        t.arm(client)
-        stream = Streamer(client, 300, 300, 0.02)
-        time.sleep(0.5)
+        stream = t.start_driving(client, 300, 300, 0.5, 0.02)
         rig.press()
         time.sleep(0.1)
         stream.stop()
         t.stopped_by(client, "estop_line")
         rig.release()
-        wait_reset(t, client)
-    t.arm(client)
-    t.drive_for(client, 200, 200, 0.5)
+        t.reset(client)
+    t.arm_and_drive(client, 200, 200, 0.5)
     t.judge(rig)
     os.close(read_end)
     os.close(write_end)

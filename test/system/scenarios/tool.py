@@ -7,7 +7,7 @@ import signal
 import sys
 import time
 
-from harness import Process, now_us
+from harness import now_us
 from scenario import scenario
 
 from .arguments import call
@@ -52,8 +52,7 @@ def iwheelctl_verbs(t):
 
 def interrupted(t, number):
     rig, client = t.running()
-    process = Process([rig.program("iwheelctl"), "--socket", rig.path("gateway.sock"), "drive", "300", "300", "--for", "20s"], rig.path("ctl.out"))
-    rig.processes.append(process)
+    process = rig.launch([rig.program("iwheelctl"), "--socket", rig.path("gateway.sock"), "drive", "300", "300", "--for", "20s"], "ctl.out")
     time.sleep(1.2)
     cut_us = now_us()
     process.signal(number)
@@ -65,7 +64,7 @@ def interrupted(t, number):
     moving = [at for at, _, speed in rig.bus.setpoints(cut_us) if speed]
     t.check(not moving or moving[-1] - cut_us < 320_000, f"at zero {(moving[-1] - cut_us) / 1000 if moving else 0:.0f} ms after the signal", True)
     t.figure(f"ramp after {ms or 0:.0f} ms")
-    t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 4), "silence")
+    t.silence(rig, client)
 
 
 @scenario("iwheelctl drive interrupted by Ctrl-C: ends in a stop", 5)
@@ -87,8 +86,7 @@ def documented_client(t):
     with open(rig.path("example.py"), "w", encoding="utf-8") as file:
         file.write(script)
     begin_us = now_us()
-    process = Process([sys.executable, rig.path("example.py"), rig.path("gateway.sock")], rig.path("example.out"))
-    rig.processes.append(process)
+    process = rig.launch([sys.executable, rig.path("example.py"), rig.path("gateway.sock")], "example.out")
     code = process.wait(8)
     t.check(code == 0, f"exit code {code}: {process.text()[-300:]}")
     t.check(any(speed == 200 for _, _, speed in rig.bus.setpoints(begin_us)), "it drives 200 mm/s")

@@ -3,19 +3,13 @@
 
 import time
 
-from client import Streamer
 from harness import now_us
 from scenario import scenario
-
-from .bus_faults import wait_reset
 
 
 def fault_while_driving(t, command, cause, within_ms, speed=400, **expected):
     """Drives, injects the fault, checks cause and reaction time; returns rig, client and why."""
-    rig, client = t.running()
-    t.arm(client)
-    stream = Streamer(client, speed, speed)
-    time.sleep(0.9)
+    rig, client, stream = t.driving(speed=speed, seconds=0.9, every=0.05)
     kind = expected.get("kind", "cut")
     fault_us = now_us()
     rig.fault(command, kind, within_ms)
@@ -34,7 +28,7 @@ def row22_left_silent(t):
     rig, client, _ = fault_while_driving(t, "mute left", "wheel_lost", 80, kind="ramp", side="left")
     t.check(not client.request("reset")["ok"], "no reset while it is offline")
     rig.sim.ask("unmute left")
-    wait_reset(t, client)
+    t.reset(client)
     t.judge(rig)
 
 
@@ -44,7 +38,7 @@ def row22_both_silent(t):
     status = client.request("status")
     t.check(not status["left"]["heard"] and not status["right"]["heard"], "both are offline")
     rig.sim.ask("unmute both")
-    wait_reset(t, client)
+    t.reset(client)
     t.judge(rig)
 
 
@@ -52,7 +46,7 @@ def row22_both_silent(t):
 def row22_sign_swapped(t):
     rig, client, _ = fault_while_driving(t, "sign both swapped", "feedback_sign", 420)
     rig.sim.ask("sign both normal")
-    wait_reset(t, client)
+    t.reset(client)
     t.judge(rig)
 
 
@@ -61,7 +55,7 @@ def row22_overspeed(t):
     rig, client, _ = fault_while_driving(t, "runaway both on", "overspeed", 3000)
     t.check(not client.request("reset")["ok"], "no reset while they turn")
     rig.sim.ask("runaway both off")
-    wait_reset(t, client, 8)
+    t.reset(client, 8)
     t.judge(rig)
 
 
@@ -69,7 +63,7 @@ def row22_overspeed(t):
 def row22_blocked(t):
     rig, client, _ = fault_while_driving(t, "block both", "wheel_blocked", 1600, kind="ramp", state="stopping")
     rig.sim.ask("unblock both")
-    t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 4), "listening again without reset")
+    t.silence(rig, client, text="listening again without reset")
     t.judge(rig)
 
 
@@ -80,7 +74,7 @@ def alone(t, fault, undo, within_ms, kind):
     largest = client.request("status")["pair"]
     t.check(largest["largest_mm"] >= largest["limit_mm"], f"the deviation is reported: {largest}, {why['sentence']}")
     t.figure(f"{why['detail']} mm from its path")
-    t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 4), "listening again without reset")
+    t.silence(rig, client, text="listening again without reset")
     t.judge(rig)
 
 
@@ -108,9 +102,7 @@ def row31_fast(t):
 def row31_third_latches(t):
     rig, client = t.running()
     for attempt in range(3):
-        t.arm(client)
-        stream = Streamer(client, 300, 300)
-        time.sleep(0.7)
+        stream = t.start_driving(client, 300, 300, 0.7)
         rig.fault("block left", within_ms=300)
         time.sleep(0.5)
         stream.stop()
@@ -118,24 +110,21 @@ def row31_third_latches(t):
         t.check(state == ("latched" if attempt == 2 else "stopping"), f"stop {attempt + 1}: {state}")
         rig.sim.ask("unblock left")
         if attempt < 2:
-            t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 4), "listening without reset")
-    wait_reset(t, client)
+            t.silence(rig, client, text="listening without reset")
+    t.reset(client)
     t.judge(rig)
 
 
 @scenario("a wheel reboots while driving", 8)
 def trap07_reboot_while_driving(t):
-    rig, client = t.running()
-    t.arm(client)
-    stream = Streamer(client, 300, 300)
-    time.sleep(0.9)
+    rig, client, stream = t.driving(seconds=0.9, every=0.05)
     rig.fault("reboot right", "ramp", within_ms=80)  # At first it sends nothing: one wheel offline.
     time.sleep(0.4)
     stream.stop()
     status = client.request("status")
     t.check(status["state"] == "latched" and status["cause"] in ("wheel_lost", "wheel_rebooted"), f"{status['state']}, {status['cause']}")
     t.check(rig.wait_status(client, lambda s: s["right"]["at_rest"], 6), "it comes back")
-    wait_reset(t, client)
+    t.reset(client)
     t.judge(rig)
 
 
@@ -145,22 +134,18 @@ def trap12_odometry_jump(t):
     t.check(client.request("status")["right"]["reboots"] == 1, "counted as a reboot")
     distance_mm = client.request("status")["right"]["distance_mm"]
     t.check(abs(distance_mm) < 3000, f"and not as a distance: {distance_mm} mm, {why['sentence']}")
-    wait_reset(t, client)
+    t.reset(client)
     t.judge(rig)
 
 
 @scenario("force in the wrong unit: invalid with a reason, never rescaled", 8)
 def row23_wrong_unit(t):
-    rig = t.rig()
-    rig.sim.ask("unit left dN")
-    rig.start_gateway()
-    client = rig.client()
+    rig, client = t.running(sim=("unit left dN",))
     status = rig.wait_status(client, lambda s: s["left"]["force_validity"] == "unit_contradicted", 6)
     t.check(status, f"flagged: {client.request('status')['left']['force_validity']}")
     left = (status or client.request("status"))["left"]
     t.check(left["force_net_mN"] is None and left["unit_evidence"] == "dN", f"no value from it: {left['force_net_mN']}, {left['unit_evidence']}")
-    t.arm(client)
-    t.drive_for(client, 100, 100, 0.5)
+    t.arm_and_drive(client, 100, 100, 0.5)
     t.judge(rig)
 
 
@@ -186,24 +171,20 @@ def row23_extremes(t):
     rig.sim.ask("raw both auto")
     time.sleep(0.3)
     t.check(all(force_of(client, side)["force_validity"] == "valid" for side in ("left", "right")), "valid again")
-    t.arm(client)
-    t.drive_for(client, 100, 100, 0.5)
+    t.arm_and_drive(client, 100, 100, 0.5)
     t.judge(rig)
 
 
 @scenario("gateway started when the wheels no longer send their offset: own estimate, and reported as such", 9)
 def row23_late_start(t):
-    rig = t.rig(sim_args=("--uptime", "100"))
-    rig.start_gateway()
-    client = rig.client()
+    rig, client = t.running(sim_args=("--uptime", "100"))
     status = rig.wait_status(client, lambda s: s["left"]["offset_provenance"] != "none", 6)
     t.check(status, f"it does not wait for ever: {force_of(client, 'left')['offset_provenance']}")
     for side in ("left", "right"):
         force = force_of(client, side)
         t.check(force["offset_provenance"] == "estimated", f"{side}: offset {force['offset_provenance']}")
         t.check(abs(force["force_net_mN"]) < 3000, f"{side} without load: {force['force_net_mN']} mN")
-    t.arm(client)  # speed control never waits for an offset
-    t.drive_for(client, 100, 100, 0.5)
+    t.arm_and_drive(client, 100, 100, 0.5)  # speed control never waits for an offset
     t.judge(rig)
 
 
