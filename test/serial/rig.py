@@ -3,7 +3,6 @@
 
 import os
 import pty
-import random
 import select
 import socket
 import threading
@@ -12,6 +11,7 @@ import tty
 import zlib
 
 from bus import now_us
+from client import Client
 from harness import Process, Rig, wait_connect
 from judge_log import Event
 
@@ -137,6 +137,12 @@ class SerialRig(Rig):
         self.processes.append(self.board)
         self.cable = Cable(self.path("port"), ours)
 
+    def plug_device(self):
+        """Connects the cable to a device that is no board. Returns the device's end."""
+        ours, theirs = socket.socketpair()
+        self.cable = Cable(self.path("port"), ours)
+        return theirs
+
     def relay_command(self, *extra):
         return [
             self.program("iwheel-serial"),
@@ -155,8 +161,7 @@ class SerialRig(Rig):
         with open(self.path("serial.conf"), "w", encoding="utf-8") as file:
             file.write("[northbound]\ngroup = none\nwatch_group = none\nmode = 0600\nwatch_mode = 0600\n")
         self.said_before = len(self.gateway.text()) if self.gateway else 0
-        self.gateway = Process(self.relay_command(*extra), self.path("relay.out"))
-        self.processes.append(self.gateway)
+        self.gateway = self.launch(self.relay_command(*extra), "relay.out")
         wait_connect(self.path("gateway.sock"), self.gateway).close()
         return self.gateway
 
@@ -175,12 +180,10 @@ class SerialRig(Rig):
         self.start_relay(*extra)
         self.await_relay("board on ")
         client = self.client(name="starter")
-        self.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"] and s["bus"]["state"] == "active")
+        self.wait_at_rest(client, active=True)
         client.close()
 
     def watcher(self):
-        from client import Client
-
         client = Client(self.path("watch.sock"), self.timeline, "watcher")
         self.clients.append(client)
         return client
@@ -218,6 +221,3 @@ def mutated(line, chance):
     elif kind == 3:
         data[at:at] = bytes(chance.randrange(256) for _ in range(1 + chance.randrange(6)))
     return bytes(data)  # Kind 4: unchanged, but too late.
-
-
-__all__ = ["Cable", "SerialRig", "framed", "mutated", "random"]

@@ -7,7 +7,6 @@ import json
 import os
 import random
 import socket
-import subprocess
 import sys
 import threading
 import time
@@ -23,7 +22,7 @@ from judge import Judge
 from judge_log import Event, Frame, Violation, signed
 from rig import Cable, SerialRig
 from scenario import scenario
-from test_wires import await_service, begin, cable_pulled, client_killed, end_well, raw_drive, relay_killed, relay_stopped, tool  # noqa: F401
+from test_wires import all_closed, await_service, begin, cable_pulled, client_killed, relay_killed, relay_stopped, stop_well, tool  # noqa: F401
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 SLICE_US = 2000  # As in image.py.
@@ -206,8 +205,7 @@ def estop_pin(t):
         t.expect(reply)
         t.rule(not rig.moving(released_us), f"moved by a reset, turn {turn}")
         t.arm(client)
-    t.expect(client.request("stop"))
-    end_well(t, rig, client)
+    stop_well(t, rig, client)
 
 
 @scenario("both resets in motion: zeros first, all clients are closed, and no later command of them is obeyed", 14)
@@ -219,15 +217,7 @@ def resets(t):
         watcher.wait_event("hello")
         t.drive_for(client, 250, 250, 0.5)
         rig.sim.send(way)
-        closed = 0
-        for one in (client, watcher):
-            try:
-                for number in range(100):
-                    one.send_raw(raw_drive(number, 250))
-                    one.read_line(0.05)
-            except (wires.Closed, OSError):
-                closed += 1
-        t.check(closed == 2, f"{closed} of 2 clients were closed after {way}: {rig.gateway.text()[-300:]}")
+        all_closed(t, rig, (client, watcher), 100, way)
         client = await_service(t, rig)
         boots.append(rig.gateway.text().rsplit(": start ", 1)[-1].split(",")[0])
         t.expect(client.drive(100, 100), "not_armed")
@@ -235,21 +225,20 @@ def resets(t):
         t.arm(client)
     t.check(len(set(boots)) == 3 and all(len(boot) == 16 for boot in boots), f"each start has a different name: {boots}")
     t.drive_for(client, 150, 150, 0.3)
-    t.expect(client.request("stop"))
-    end_well(t, rig, client)
+    stop_well(t, rig, client)
 
 
 @scenario("configured by iwheelctl and the Python client: stored values survive a reset", 12)
 def kept(t):
     rig, client = t.running()
-    t.check(run_tool(t, rig, "config", "set", "drive.lease_ms", "300")["staged"], "staged")
-    t.check("no key" in run_tool(t, rig, "config", "set", "bus.interface", "can0", code=1)["message"], "a daemon's key")
-    t.check(run_tool(t, rig, "confirm", "wheel_radius")["state"] == "confirmed", "confirmed")
+    t.check(reply_of_tool(t, rig, "config", "set", "drive.lease_ms", "300")["staged"], "staged")
+    t.check("no key" in reply_of_tool(t, rig, "config", "set", "bus.interface", "can0", code=1)["message"], "a daemon's key")
+    t.check(reply_of_tool(t, rig, "confirm", "wheel_radius")["state"] == "confirmed", "confirmed")
     rig.pass_time(2.5)
-    tared = run_tool(t, rig, "tare", "left")["left"]["offset_mN"]
+    tared = reply_of_tool(t, rig, "tare", "left")["left"]["offset_mN"]
     rig.pass_time(2.5)
-    t.check(run_tool(t, rig, "status")["memory"]["state"] == "kept", "kept")
-    t.check(run_tool(t, rig, "config", "commit")["restarts"], "a restart with the new value")
+    t.check(reply_of_tool(t, rig, "status")["memory"]["state"] == "kept", "kept")
+    t.check(reply_of_tool(t, rig, "config", "commit")["restarts"], "a restart with the new value")
     with contextlib.suppress(wires.Closed, OSError):
         t.check(client.wait_event("nothing", 3.0), "its clients are closed")
     await_service(t, rig).close()
@@ -265,15 +254,13 @@ def kept(t):
     t.check((radius["state"], radius["evidence"]) == ("confirmed", "operator"), f"{radius}")
     t.check((left["offset_origin"], left["force_offset_mN"], left["offset_provenance"]) == ("operator", tared, "stored"), f"{left}")
     t.check(status["lease"]["lease_ms"] == 300, "configured")
-    command = [rig.program("iwheelctl"), "--socket", rig.path("gateway.sock"), "ledger"]
-    output = " ".join(subprocess.run(command, capture_output=True, text=True, timeout=20, check=False).stdout.split())
+    output = " ".join(wires.run_tool(rig, "ledger").stdout.split())
     t.check("wheel_radius: confirmed by the operator" in output and "track: configured, not verified" in output, output)
     t.judge(rig, moves=False)
 
 
-def run_tool(t, rig, *words, code=0):
+def reply_of_tool(t, rig, *words, code=0):
     """Runs iwheelctl with the relay and returns its reply."""
-    command = [rig.program("iwheelctl"), "--socket", rig.path("gateway.sock"), "--json", *words]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=20, check=False)
+    done = wires.run_tool(rig, "--json", *words)
     t.check(done.returncode == code, f"iwheelctl {' '.join(words)}: {done.returncode} {done.stdout} {done.stderr}")
     return json.loads(done.stdout.splitlines()[-1]) if done.stdout else {}

@@ -12,10 +12,9 @@ import threading
 import time
 
 from bus import now_us
-from client import Client, Closed
-from harness import Process
+from client import Closed
 from judge_log import Event, percentile
-from rig import Cable, framed, mutated
+from rig import framed, mutated
 from scenario import scenario
 
 LEASE_US = 200_000
@@ -23,10 +22,17 @@ STOP_AGAIN_US = 150_000  # SERIAL_AGAIN_US of the relay
 SEEN_US = 60_000  # the bus log has what happened until then
 
 
-def begin(t, **options):
+def begin(t):
     """Starts a rig and arms a client."""
-    rig, client = t.running(**options)
+    rig, client = t.running()
     t.arm(client)
+    return rig, client
+
+
+def begin_driving(t, *drive):
+    """The same, and the client drives with these arguments of `drive_for`."""
+    rig, client = begin(t)
+    t.drive_for(client, *drive)
     return rig, client
 
 
@@ -51,8 +57,26 @@ def read_replies(client, count, seconds=3.0):
 
 def end_well(t, rig, client=None):
     client = client or rig.client()
-    t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 6), "nothing is sent at the end")
+    t.silence(rig, client, 6, "nothing is sent at the end")
     t.judge(rig)
+
+
+def stop_well(t, rig, client):
+    t.expect(client.request("stop"))
+    end_well(t, rig, client)
+
+
+def all_closed(t, rig, clients, tries, what):
+    """Drives on in spite of a restart of the board, until each client is closed."""
+    closed = 0
+    for client in clients:
+        try:
+            for number in range(tries):
+                client.send_raw(raw_drive(number, 250))
+                client.read_line(0.05)
+        except (Closed, OSError):
+            closed += 1
+    t.check(closed == len(clients), f"{closed} of {len(clients)} clients were closed after {what}: {rig.gateway.text()[-300:]}")
 
 
 @scenario("a client drives, watches and stops through the relay, and gets the replies of a gateway", 5)
@@ -94,8 +118,7 @@ def tell_speed(t, rig, client):
 
 @scenario("a client that is killed while it drives loses its lease immediately", 3)
 def client_killed(t):
-    rig, client = begin(t)
-    t.drive_for(client, 250, 250, 0.6)
+    rig, client = begin_driving(t, 250, 250, 0.6)
     gone_us = now_us()
     client.close()
     rig.timeline.append(Event(gone_us, "gone"))
@@ -109,8 +132,7 @@ def client_killed(t):
 def relay_stopped(t):
     rig, client = begin(t)
     for span in (0.6, 0.25, 1.5)[: rig.times(3)]:
-        t.arm(client)
-        t.drive_for(client, 200, 200, 0.4)
+        t.arm_and_drive(client, 200, 200, 0.4)
         rig.gateway.signal(signal.SIGSTOP)
         for number in range(100_000, 100_000 + int(span * 40)):  # Its socket accepts 70 commands without waiting.
             client.send_raw(raw_drive(number, 200))
@@ -127,14 +149,13 @@ def relay_stopped(t):
             client = rig.client()
         time.sleep(0.5)
         t.check(not rig.moving(resumed_us + 250_000), f"no motion begins after {span} s without commands")
-        t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 6), "listening")
+        t.silence(rig, client, 6, "listening")
     t.judge(rig)
 
 
 @scenario("a relay that is killed stops the wheels within the lease, and the next one serves immediately", 5)
 def relay_killed(t):
-    rig, client = begin(t)
-    t.drive_for(client, 250, 250, 0.6)
+    rig, _ = begin_driving(t, 250, 250, 0.6)
     rig.gateway.signal(signal.SIGKILL)
     rig.gateway.wait(2)
     killed_us = now_us()
@@ -144,10 +165,8 @@ def relay_killed(t):
     fresh = rig.client()
     t.expect(fresh.drive(100, 100), "not_armed")
     rig.wait_status(fresh, lambda s: s["state"] == "listening", 6)
-    t.arm(fresh)
-    t.drive_for(fresh, 150, 150, 0.3)
-    t.expect(fresh.request("stop"))
-    end_well(t, rig, fresh)
+    t.arm_and_drive(fresh, 150, 150, 0.3)
+    stop_well(t, rig, fresh)
 
 
 @scenario("the cable is pulled at any byte: the wheels stop, and the next plug is served", 12)
@@ -177,10 +196,9 @@ def cable_pulled(t):
         time.sleep(0.3)
         rig.cable.plug()
         client = await_service(t, rig)
-        t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 6), f"listening after pull {turn}")
+        t.silence(rig, client, 6, f"listening after pull {turn}")
         t.arm(client)
-    t.expect(client.request("stop"))
-    end_well(t, rig, client)
+    stop_well(t, rig, client)
 
 
 def await_service(t, rig, seconds=5.0):
@@ -208,22 +226,12 @@ def board_reset(t):
     rig.board.signal(signal.SIGHUP)
     rig.timeline.append(Event(now_us(), "start"))
     rig.timeline.append(Event(now_us(), "restart_hold", within_us=300_000))
-    closed = 0
-    for one in (client, watcher):
-        try:
-            for number in range(40):
-                one.send_raw(raw_drive(number, 250))
-                one.read_line(0.05)
-        except (Closed, OSError):
-            closed += 1
-    t.check(closed == 2, f"{closed} of 2 clients were closed: {rig.gateway.text()[-300:]}")
+    all_closed(t, rig, (client, watcher), 40, "a reset")
     client = await_service(t, rig)
     t.expect(client.drive(100, 100), "not_armed")
     t.check(rig.wait_status(client, lambda s: s["state"] == "listening" and s["left"]["at_rest"], 6), "listening")
-    t.arm(client)
-    t.drive_for(client, 150, 150, 0.3)
-    t.expect(client.request("stop"))
-    end_well(t, rig, client)
+    t.arm_and_drive(client, 150, 150, 0.3)
+    stop_well(t, rig, client)
 
 
 @scenario("100 000 corrupted, cut, doubled and late lines move nothing", 14, native="a flood")
@@ -232,10 +240,9 @@ def bad_lines(t):
 
 
 def send_bad_lines(t, count, block_lines):
-    rig, client = begin(t)
-    t.drive_for(client, 200, 200, 1.0)
+    rig, client = begin_driving(t, 200, 200, 1.0)
     t.expect(client.request("stop"))
-    t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 6), "listening")
+    t.silence(rig, client, 6, "listening")
     time.sleep(0.4)
     drives = [line + b"\n" for line in bytes(rig.cable.from_relay).split(b"\n") if b'"drive"' in line]
     t.check(len(drives) > 10 and all(b'"boot"' in line and b'"t_us"' in line for line in drives), f"{drives[:1]}")
@@ -255,11 +262,9 @@ def send_bad_lines(t, count, block_lines):
     errors = bytes(rig.cable.from_board).count(b'"line_error"')
     t.check(0 < errors <= 5 * (now_us() - before_us) / 1e6 + 2, f"{errors} line_errors in {(now_us() - before_us) / 1e6:.1f} s")
     t.figure(f"{sent} lines in {(now_us() - before_us) / 1e6:.1f} s, {errors} answers")
-    t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 6), "listening")
-    t.arm(client)
-    t.drive_for(client, 150, 150, 0.3)
-    t.expect(client.request("stop"))
-    end_well(t, rig, client)
+    t.silence(rig, client, 6, "listening")
+    t.arm_and_drive(client, 150, 150, 0.3)
+    stop_well(t, rig, client)
 
 
 class Damage:
@@ -309,8 +314,7 @@ def noisy(t):
     rig.cable.up = None
     t.check(stops == 6, f"{stops} of 6 stops were answered")
     t.figure(f"{bytes(rig.cable.from_board).count(b'line_error')} line_errors")
-    t.expect(client.request("stop"))
-    end_well(t, rig, client)
+    stop_well(t, rig, client)
 
 
 @scenario("a wire that damages one line in thirty from the board: a missing reply is reported to the client, and a stop is repeated", 8)
@@ -330,13 +334,12 @@ def deaf(t):
         t.check(not rig.moving(stopped_us + 600_000), "it stops")
         client.arm()
     rig.cable.down = None
-    t.check(rig.wait_status(client, lambda s: s.get("state") == "listening", 6), "listening")
+    t.silence(rig, client, 6, "listening")
 
 
 @scenario("commands that the wire delays for longer than the lease move no wheel", 5)
 def delayed(t):
-    rig, client = begin(t)
-    t.drive_for(client, 200, 200, 0.4)
+    rig, client = begin_driving(t, 200, 200, 0.4)
     rig.cable.held = True
     time.sleep(0.03)  # The cable has delivered the bytes that it held.
     held_us = now_us()
@@ -371,8 +374,7 @@ def too_fast(t):
     replaced = [r for r in replies if not r["ok"]]
     t.check(all(r["error"] == "stale_command" for r in replaced), f"{[r for r in replaced if r['error'] != 'stale_command'][:2]}")
     t.check(0 < len(replaced) < 400, f"{len(replaced)} of 400 were replaced")
-    t.expect(client.request("stop"))
-    end_well(t, rig, client)
+    stop_well(t, rig, client)
 
 
 @scenario("a flood of requests of one client costs another neither lease nor stop", 6, native="a flood")
@@ -435,7 +437,7 @@ def rights(t):
     t.drive_for(client, 200, 200, 0.4)
     t.expect(watcher.request("stop"))
     t.expect(client.drive(200, 200), "not_armed")
-    t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 6), "listening")
+    t.silence(rig, client, 6, "listening")
     t.expect(watcher.request("estop", reason="a test"))
     t.check(client.request("status")["state"] == "latched", "latched")
     others = [rig.client() for _ in range(4)] + [rig.watcher() for _ in range(2)]
@@ -449,14 +451,20 @@ def rights(t):
     t.judge(rig)
 
 
+def run(command):
+    return subprocess.run(command, capture_output=True, text=True, timeout=20, check=False)
+
+
+def run_tool(rig, *words):
+    return run([rig.program("iwheelctl"), "--socket", rig.path("gateway.sock"), *words])
+
+
 @scenario("one port has one relay, and a running gateway retains its socket", 4)
 def alone(t):
     rig, _ = t.running()
-    second = subprocess.run(
-        rig.relay_command("--socket", rig.path("second.sock"), "--watch-socket", "none"), capture_output=True, text=True, timeout=10, check=False
-    )
+    second = run(rig.relay_command("--socket", rig.path("second.sock"), "--watch-socket", "none"))
     t.check(second.returncode == 69 and str(rig.gateway.child.pid) in second.stderr and "two relays" in second.stderr, f"{second}")
-    other = subprocess.run(rig.relay_command("--port", "/dev/null"), capture_output=True, text=True, timeout=10, check=False)
+    other = run(rig.relay_command("--port", "/dev/null"))
     t.check(other.returncode == 69 and "another program answers" in other.stderr, f"{other}")
     t.check(rig.client().request("hello")["ok"], "the first relay continues")
     t.judge(rig, moves=False)
@@ -504,8 +512,7 @@ def check_reported(t, rig, sent, words, seconds):
 def explained(t):
     rig = t.rig()
     for sent, words in troubles():
-        ours, theirs = socket.socketpair()
-        rig.cable = Cable(rig.path("port"), ours)
+        theirs = rig.plug_device()
         with talking(theirs, sent):
             relay = rig.start_relay()
             check_reported(t, rig, sent, words, 8.0)
@@ -518,8 +525,7 @@ def explained(t):
 @scenario("the same relay reports another reason soon after the device changes", 18)
 def explained_anew(t):
     rig = t.rig()
-    ours, theirs = socket.socketpair()
-    rig.cable = Cable(rig.path("port"), ours)
+    theirs = rig.plug_device()
     rig.start_relay()
     for sent, words in troubles():
         with talking(theirs, sent):
@@ -530,8 +536,7 @@ def explained_anew(t):
 @scenario("a board that restarted after a fault: the relay logs cause and address", 4)
 def fault_of_the_board(t):
     rig = t.rig()
-    ours, theirs = socket.socketpair()
-    rig.cable = Cable(rig.path("port"), ours)
+    theirs = rig.plug_device()
     rig.start_relay()
     link = {"event": "link", "boot": "0123456789abcdef", "version": "0.3.0", "fault_cause": 0x0C000100, "fault_pc": 0x08001234}
     with talking(theirs, framed(b"0 12 " + json.dumps(link).encode())):
@@ -541,8 +546,7 @@ def fault_of_the_board(t):
 
 @scenario("ends cleanly by SIGTERM while a client drives", 3)
 def terminated(t):
-    rig, client = begin(t)
-    t.drive_for(client, 200, 200, 0.4)
+    rig, _ = begin_driving(t, 200, 200, 0.4)
     rig.timeline.append(Event(now_us(), "gone"))
     rig.gateway.signal(signal.SIGTERM)
     t.check(rig.gateway.wait(2) == 0, f"exit code: {rig.gateway.text()[-300:]}")
@@ -555,11 +559,7 @@ def terminated(t):
 @scenario("iwheelctl, unchanged, through the relay", 5)
 def tool(t):
     rig, _ = t.running()
-    ctl = [rig.program("iwheelctl"), "--socket", rig.path("gateway.sock")]
-    drove = subprocess.run([*ctl, "drive", "200", "200", "--for", "800ms"], capture_output=True, text=True, timeout=20, check=False)
+    drove = run_tool(rig, "drive", "200", "200", "--for", "800ms")
     t.check(drove.returncode == 0 and "drove 200/200" in drove.stdout, f"{drove}")
-    why = subprocess.run([*ctl, "--json", "why"], capture_output=True, text=True, timeout=20, check=False)
+    why = run_tool(rig, "--json", "why")
     t.check(json.loads(why.stdout)["cause"] == "client_stop", f"{why}")
-
-
-__all__ = ["Client", "Process"]
