@@ -137,6 +137,8 @@ class WithWheels(unittest.TestCase):
         self.assertNotIn("███│", left)
         self.assertTrue(any("iwheelctl drives (pid" in row for row in rows), rows)
         self.assertTrue(any("worst" in row and "--" not in row for row in rows), rows)
+        top.press("\x13")  # Ctrl-S.
+        top.screen_after(1)
         top.press(" ")
         top.wait_for("stop: done, now stopping")
         rows = top.wait_for("last stop: ")

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: MIT
 #include "bridge_service.h"
 
+#include <fcntl.h>
 #include <signal.h>
 #include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <sys/un.h>
 #include <time.h>
 #include <unistd.h>
@@ -53,12 +55,31 @@ bool bridge_service_wait(struct pollfd *fds, unsigned count, int wait_ms) {
     return end_asked == 0;
 }
 
+/// A terminal, a pipe or a device gets a description of its own, so that O_NONBLOCK affects no other process. A socket
+/// has only the common one. A file never waits, and shares its position with stdout.
+static void log_without_waiting(void) {
+    struct stat status;
+    if (fstat(STDERR_FILENO, &status) != 0 || S_ISREG(status.st_mode)) {
+        return;
+    }
+    if (S_ISSOCK(status.st_mode)) {
+        (void)fcntl(STDERR_FILENO, F_SETFL, fcntl(STDERR_FILENO, F_GETFL) | O_NONBLOCK);
+        return;
+    }
+    const int own = open("/proc/self/fd/2", O_WRONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
+    if (own >= 0) {
+        (void)dup2(own, STDERR_FILENO);
+        (void)close(own);
+    }
+}
+
 void bridge_service_open(bridge_service_t *self) {
     struct sockaddr_un address = {.sun_family = AF_UNIX};
     const char *path = getenv("NOTIFY_SOCKET");
     const char *limit = getenv("WATCHDOG_USEC");
     const size_t length = (path != NULL) ? strlen(path) : 0U;
     *self = (bridge_service_t){.fd = -1};
+    log_without_waiting();
     if (length < 2U || length >= sizeof address.sun_path || (path[0] != '/' && path[0] != '@')) {
         return;
     }

@@ -27,7 +27,8 @@ void bridge_service_take_signals(void);
 /// Waits like poll. Returns false if a signal requested the end, before or during the call.
 bool bridge_service_wait(struct pollfd *fds, unsigned count, int wait_ms);
 
-/// Reads NOTIFY_SOCKET and WATCHDOG_USEC from the environment.
+/// Reads NOTIFY_SOCKET and WATCHDOG_USEC from the environment. From now on stderr drops what its reader does not accept
+/// immediately (a stopped terminal, a full pipe): a log line must not delay a stop. Call it before the loop.
 void bridge_service_open(bridge_service_t *self);
 
 /// Sends a message to the service manager. Never waits.

@@ -13,6 +13,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <term.h>
+#include <termios.h>
 #include <unistd.h>
 
 #define RATE_HZ   10
@@ -212,9 +213,21 @@ static bool wait_and_take(top_t *self) {
     return true;
 }
 
+/// Makes Ctrl-S a key without a meaning. Otherwise it would stop the output, this program would wait for that, and the
+/// keys that stop the wheels would do nothing.
+static void forgo_flow_control(void) {
+    struct termios modes;
+    if (tcgetattr(STDIN_FILENO, &modes) == 0) {
+        modes.c_iflag &= ~(tcflag_t)IXON;
+        (void)tcsetattr(STDIN_FILENO, TCSANOW, &modes);
+        (void)def_prog_mode();
+    }
+}
+
 static void prepare_terminal(top_model_t *model) {
     const char *no_color = getenv("NO_COLOR");
     (void)cbreak();
+    forgo_flow_control();
     (void)noecho();
     (void)curs_set(0);
     (void)keypad(stdscr, TRUE);
