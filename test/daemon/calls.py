@@ -17,7 +17,7 @@ PURE = """__ctype_b_loc __errno_location abort bcmp bsearch getenv getopt_long i
 # These write to a stream of the test or to memory; stderr is discarded.
 STREAMS = "stderr stdin stdout fclose ferror fflush fmemopen fopen fprintf fputs freopen fwrite printf puts"
 # Only these use them: child processes, which are simulated; --check; a bus or an e-stop unix:PATH; kernels without epoll_pwait2; a configured group.
-NOT_CALLED = """_exit access close_range closedir dup2 faccessat fallocate fchmod fchownat fdopen fdopendir fileno fsync getgrnam glob globfree ppoll readdir
+NOT_CALLED = """_exit access closedir closefrom dup2 faccessat fallocate fchmod fchownat fdopen fdopendir fileno fsync getgrnam glob globfree ppoll readdir
     realpath renameat rewind setpriority sleep"""
 # The virtual kernel itself calls the real functions.
 BEHIND = "calloc free"

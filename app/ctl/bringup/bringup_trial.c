@@ -61,7 +61,7 @@ _Noreturn static void become_guard(const char *folder, int held) {
     (void)setsid();
     (void)signal(SIGTERM, SIG_IGN);
     (void)dup2(held, STDIN_FILENO);
-    (void)close_range(STDOUT_FILENO, UINT_MAX, 0);
+    closefrom(STDOUT_FILENO);
     while (read(STDIN_FILENO, &nothing, 1) < 0 && errno == EINTR) {
     }
     _exit(remove_folder(folder));

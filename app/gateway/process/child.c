@@ -27,8 +27,7 @@ static void become(const gw_child_work_t *work, int fd) {
         }
         (void)close(null);
     }
-    (void)close_range(ITS_FD + 1, UINT_MAX,
-                      0);          // Otherwise the clients and the lock of the gateway would stay open in it.
+    closefrom(ITS_FD + 1);         // Otherwise the clients and the lock of the gateway would stay open in it.
     (void)signal(SIGINT, SIG_IGN); // It ends when the gateway does.
     (void)signal(SIGTERM, SIG_IGN);
     (void)signal(SIGHUP, SIG_IGN);

@@ -159,7 +159,7 @@ int iwl_netlink_restart_start(int interface, pid_t *out_process) {
         return errno;
     }
     if (process == 0) {
-        (void)close_range(STDERR_FILENO + 1, UINT_MAX, 0); // Otherwise clients and the lock file would stay open in it.
+        closefrom(STDERR_FILENO + 1); // Otherwise clients and the lock file would stay open in it.
         const int error = restart(interface);
         _exit((error <= UCHAR_MAX) ? error : EIO);
     }
