@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Configuration file of the gateway: which texts are accepted or refused, and the messages of a refusal.
-#include "config/gateway_config.h"
+#include "test_config_rig.h"
 
 #include "unit.h"
 
@@ -8,52 +8,12 @@
 #include <string.h>
 #include <unistd.h>
 
-static char messages[8192];
-static gateway_config_t config;
-static gateway_config_t before;
-
-static int parse_bytes(const char *text, size_t size) {
-    memset(messages, 0, sizeof messages);
-    memset(&config, 0xA5, sizeof config);
-    before = config;
-    FILE *err = fmemopen(messages, sizeof messages, "w");
-    const int result = gateway_config_parse("iw.conf", text, size, &config, err);
-    fclose(err);
-    return result;
-}
-
-static int parse(const char *text) {
-    return parse_bytes(text, strlen(text));
-}
-
-static void accepted(const char *text) {
-    TEST_ASSERT_EQUAL_INT_MESSAGE(0, parse(text), messages);
-    TEST_ASSERT_EQUAL_STRING("", messages);
-}
-
-/// Checks that the text is refused, that nothing is applied, and that the messages contain both strings.
-static void refused(const char *text, const char *where, const char *what) {
-    TEST_ASSERT_EQUAL_INT_MESSAGE(GATEWAY_CONFIG_ERROR, parse(text), text);
-    TEST_ASSERT_EQUAL_MEMORY(&before, &config, sizeof config);
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(messages, where), messages);
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(messages, what), messages);
-}
-
 static unsigned lines_in(const char *text) {
     unsigned lines = 0;
     for (; *text != '\0'; text++) {
         lines += (*text == '\n') ? 1U : 0U;
     }
     return lines;
-}
-
-static char *printed(const gateway_config_t *from) {
-    char *text = NULL;
-    size_t size = 0;
-    FILE *out = open_memstream(&text, &size);
-    gateway_config_print(from, out);
-    fclose(out);
-    return text;
 }
 
 /// print -> load -> print must not change a byte.
@@ -492,16 +452,6 @@ TEST(test_print_of_defaults_equals_the_shipped_file) {
     free(text);
 }
 
-static int load(const char *path) {
-    memset(messages, 0, sizeof messages);
-    memset(&config, 0xA5, sizeof config);
-    before = config;
-    FILE *err = fmemopen(messages, sizeof messages, "w");
-    const int result = gateway_config_load(path, &config, err);
-    fclose(err);
-    return result;
-}
-
 TEST(test_load_reads_a_file_and_names_it_in_errors) {
     char path[] = "/tmp/iwheel-config-XXXXXX";
     const int file = mkstemp(path);
@@ -529,14 +479,6 @@ TEST(test_load_of_missing_file_directory_or_device_is_refused) {
     TEST_ASSERT_EQUAL_INT(GATEWAY_CONFIG_ERROR, load("/dev/zero"));
     TEST_ASSERT_NOT_NULL(strstr(messages, "not a regular file"));
     TEST_ASSERT_EQUAL_MEMORY(&before, &config, sizeof config);
-}
-
-static int override(const char *name, const char *value) {
-    memset(messages, 0, sizeof messages);
-    FILE *err = fmemopen(messages, sizeof messages, "w");
-    const int result = gateway_config_override(&config, name, value, "--option", err);
-    fclose(err);
-    return result;
 }
 
 TEST(test_override_changes_one_key_by_the_same_rules) {

@@ -1,42 +1,17 @@
 // SPDX-License-Identifier: MIT
 // Values in the configuration file that would violate a safety rule are refused with key, rule, value and permitted
 // range.
-#include "config/gateway_config.h"
+#include "test_config_rig.h"
 
 #include "unit.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-static char messages[4096];
-static gateway_config_t config;
-
-static int parse(const char *text) {
-    memset(messages, 0, sizeof messages);
-    FILE *err = fmemopen(messages, sizeof messages, "w");
-    const int result = gateway_config_parse("iw.conf", text, strlen(text), &config, err);
-    fclose(err);
-    return result;
-}
-
-static void accepted(const char *text) {
-    TEST_ASSERT_EQUAL_INT_MESSAGE(0, parse(text), messages);
-}
-
-static void refused(const char *text, const char *where, const char *what) {
-    TEST_ASSERT_EQUAL_INT_MESSAGE(GATEWAY_CONFIG_ERROR, parse(text), text);
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(messages, where), messages);
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(messages, what), messages);
-}
-
 /// Checks that the printed configuration is accepted and has the same values.
 static void assert_fixed_point(void) {
     const uint16_t rest_rpm = config.core.rest_rpm;
-    char *text = NULL;
-    size_t size = 0;
-    FILE *out = open_memstream(&text, &size);
-    gateway_config_print(&config, out);
-    fclose(out);
+    char *text = printed(&config);
     accepted(text);
     TEST_ASSERT_EQUAL_UINT16(rest_rpm, config.core.rest_rpm);
     free(text);

@@ -15,24 +15,24 @@ static learn_drives_t drives;
 static iw_config_t config;
 static int64_t now_us;
 
-static void feed(const message_t *message) {
+static void feed_marked(const message_t *message, candump_mark_t mark) {
     iw_can_frame_t frame;
     TEST_ASSERT_EQUAL_INT(IW_OK, message_encode(message, &frame));
-    const candump_t recorded = candump_from_core(&frame, now_us, "can0");
+    candump_t recorded = candump_from_core(&frame, now_us, "can0");
+    recorded.mark = mark;
     learn_frame(&learn, &recorded);
     learn_drives_frame(&drives, &recorded);
+}
+
+static void feed(const message_t *message) {
+    feed_marked(message, CANDUMP_RECEIVED);
 }
 
 static void setpoint(iw_side_t side, int16_t speed_mm_s, int16_t current_mA, candump_mark_t mark) {
     const message_t message = {.kind = IW_CODEC_SETPOINT,
                                .side = side,
                                .as = {.setpoint = {.type = 1, .speed_mm_s = speed_mm_s, .current_mA = current_mA}}};
-    iw_can_frame_t frame;
-    TEST_ASSERT_EQUAL_INT(IW_OK, message_encode(&message, &frame));
-    candump_t recorded = candump_from_core(&frame, now_us, "can0");
-    recorded.mark = mark;
-    learn_frame(&learn, &recorded);
-    learn_drives_frame(&drives, &recorded);
+    feed_marked(&message, mark);
 }
 
 static void speed(iw_side_t side, int16_t rpm) {

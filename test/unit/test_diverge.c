@@ -60,10 +60,19 @@ static void settle(speeds_t speeds) {
     TEST_ASSERT_EQUAL_INT32(speeds.right_mm_s * 1000, pair.expected_um_s[IW_RIGHT]);
 }
 
+/// The pair follows the applied speeds, then measures these.
+static uint32_t drive(speeds_t applied, speeds_t measured, uint32_t for_ms) {
+    settle(applied);
+    return go_on(applied, measured, for_ms);
+}
+
+static void assert_drive(iw_diverge_verdict_t expected, speeds_t applied, speeds_t measured, uint32_t for_ms) {
+    (void)drive(applied, measured, for_ms);
+    TEST_ASSERT_EQUAL_INT(expected, verdict);
+}
+
 TEST(test_diverge_following_pair_has_no_deviation) {
-    settle((speeds_t){800, -300});
-    (void)go_on((speeds_t){800, -300}, (speeds_t){800, -300}, 10000U);
-    TEST_ASSERT_EQUAL_INT(IW_DIVERGE_NOT, verdict);
+    assert_drive(IW_DIVERGE_NOT, (speeds_t){800, -300}, (speeds_t){800, -300}, 10000U);
     TEST_ASSERT_EQUAL_INT32(0, pair.path_um);
     TEST_ASSERT_EQUAL_INT32(0, pair.largest_um);
 }
@@ -111,55 +120,41 @@ TEST(test_diverge_blocked_wheel_is_slow_after_60_mm) {
 }
 
 TEST(test_diverge_blocked_wheel_in_reverse_is_slow) {
-    settle((speeds_t){-1000, -1000});
-    TEST_ASSERT_UINT32_WITHIN(3, 32, go_on((speeds_t){-1000, -1000}, (speeds_t){0, -1000}, 1000U));
+    TEST_ASSERT_UINT32_WITHIN(3, 32, drive((speeds_t){-1000, -1000}, (speeds_t){0, -1000}, 1000U));
     TEST_ASSERT_EQUAL_INT(IW_DIVERGE_SLOW, verdict);
     TEST_ASSERT_EQUAL_UINT8(IW_LEFT, pair.side);
 }
 
 TEST(test_diverge_wheel_in_the_opposite_direction_is_slow) {
-    settle((speeds_t){400, 400});
-    (void)go_on((speeds_t){400, 400}, (speeds_t){400, -400}, 1000U);
-    TEST_ASSERT_EQUAL_INT(IW_DIVERGE_SLOW, verdict);
+    assert_drive(IW_DIVERGE_SLOW, (speeds_t){400, 400}, (speeds_t){400, -400}, 1000U);
     TEST_ASSERT_EQUAL_UINT8(IW_RIGHT, pair.side);
 }
 
 TEST(test_diverge_compares_at_low_speed) {
-    settle((speeds_t){99, 99});
-    TEST_ASSERT_UINT32_WITHIN(10, 362, go_on((speeds_t){99, 99}, (speeds_t){0, 99}, 3000U));
+    TEST_ASSERT_UINT32_WITHIN(10, 362, drive((speeds_t){99, 99}, (speeds_t){0, 99}, 3000U));
     TEST_ASSERT_EQUAL_INT(IW_DIVERGE_SLOW, verdict);
 }
 
 TEST(test_diverge_wheel_below_80_percent_is_slow_else_away) {
-    settle((speeds_t){1000, 1000});
-    (void)go_on((speeds_t){1000, 1000}, (speeds_t){800, 1000}, 3000U);
-    TEST_ASSERT_EQUAL_INT(IW_DIVERGE_AWAY, verdict);
+    assert_drive(IW_DIVERGE_AWAY, (speeds_t){1000, 1000}, (speeds_t){800, 1000}, 3000U);
     begin();
-    settle((speeds_t){1000, 1000});
-    (void)go_on((speeds_t){1000, 1000}, (speeds_t){799, 1000}, 3000U);
-    TEST_ASSERT_EQUAL_INT(IW_DIVERGE_SLOW, verdict);
+    assert_drive(IW_DIVERGE_SLOW, (speeds_t){1000, 1000}, (speeds_t){799, 1000}, 3000U);
 }
 
 /// Below a quarter of the expected speed the whole difference counts, and double.
 TEST(test_diverge_wheel_below_25_percent_counts_double) {
-    settle((speeds_t){400, 400});
-    const uint32_t quarter_ms = go_on((speeds_t){400, 400}, (speeds_t){400, 100}, 1000U);
+    const uint32_t quarter_ms = drive((speeds_t){400, 400}, (speeds_t){400, 100}, 1000U);
     begin();
-    settle((speeds_t){400, 400});
-    const uint32_t below_ms = go_on((speeds_t){400, 400}, (speeds_t){400, 99}, 1000U);
+    const uint32_t below_ms = drive((speeds_t){400, 400}, (speeds_t){400, 99}, 1000U);
     TEST_ASSERT_UINT32_WITHIN(6, 252, quarter_ms);
     TEST_ASSERT_UINT32_WITHIN(4, 106, below_ms);
 }
 
 /// Below 50 mm/s one rpm is too coarse to detect a wheel that does not turn.
 TEST(test_diverge_command_below_50_mm_s_counts_once) {
-    settle((speeds_t){49, 49});
-    (void)go_on((speeds_t){49, 49}, (speeds_t){49, 0}, 20000U);
-    TEST_ASSERT_EQUAL_INT(IW_DIVERGE_NOT, verdict);
+    assert_drive(IW_DIVERGE_NOT, (speeds_t){49, 49}, (speeds_t){49, 0}, 20000U);
     begin();
-    settle((speeds_t){50, 50});
-    (void)go_on((speeds_t){50, 50}, (speeds_t){50, 0}, 20000U);
-    TEST_ASSERT_EQUAL_INT(IW_DIVERGE_SLOW, verdict);
+    assert_drive(IW_DIVERGE_SLOW, (speeds_t){50, 50}, (speeds_t){50, 0}, 20000U);
 }
 
 TEST(test_diverge_wheel_that_is_too_fast_is_away) {
@@ -180,9 +175,7 @@ TEST(test_diverge_uncommanded_wheel_is_away_in_both_directions) {
 }
 
 TEST(test_diverge_droop_and_resolution_are_tolerated) {
-    settle((speeds_t){1000, 1000});
-    (void)go_on((speeds_t){1000, 1000}, (speeds_t){943, 1000}, 10000U);
-    TEST_ASSERT_EQUAL_INT(IW_DIVERGE_NOT, verdict);
+    assert_drive(IW_DIVERGE_NOT, (speeds_t){1000, 1000}, (speeds_t){943, 1000}, 10000U);
     TEST_ASSERT_EQUAL_INT32(0, pair.path_um);
     (void)go_on((speeds_t){1000, 1000}, (speeds_t){935, 1000}, 10000U);
     TEST_ASSERT_EQUAL_INT(IW_DIVERGE_NOT, verdict);
@@ -190,17 +183,13 @@ TEST(test_diverge_droop_and_resolution_are_tolerated) {
 }
 
 TEST(test_diverge_both_wheels_equally_slow_have_no_deviation) {
-    settle((speeds_t){1000, 1000});
-    (void)go_on((speeds_t){1000, 1000}, (speeds_t){0, 0}, 3000U);
-    TEST_ASSERT_EQUAL_INT(IW_DIVERGE_NOT, verdict);
+    assert_drive(IW_DIVERGE_NOT, (speeds_t){1000, 1000}, (speeds_t){0, 0}, 3000U);
     TEST_ASSERT_EQUAL_INT32(0, pair.path_um);
 }
 
 /// A difference that leaks as fast as it grows stays below the limit: 60 mm in 1000 ms.
 TEST(test_diverge_steady_difference_below_the_leak_is_tolerated) {
-    settle((speeds_t){500, 500});
-    (void)go_on((speeds_t){500, 500}, (speeds_t){500, 595}, 20000U);
-    TEST_ASSERT_EQUAL_INT(IW_DIVERGE_NOT, verdict);
+    assert_drive(IW_DIVERGE_NOT, (speeds_t){500, 500}, (speeds_t){500, 595}, 20000U);
     TEST_ASSERT_GREATER_THAN_INT32(56000, pair.largest_um);
     (void)go_on((speeds_t){500, 500}, (speeds_t){500, 600}, 20000U);
     TEST_ASSERT_EQUAL_INT(IW_DIVERGE_AWAY, verdict);
@@ -209,16 +198,14 @@ TEST(test_diverge_steady_difference_below_the_leak_is_tolerated) {
 TEST(test_diverge_leak_and_limit_are_configured) {
     config.pair_mm = 100;
     config.pair_leak_ms = 3000;
-    settle((speeds_t){500, 500});
-    const uint32_t took_ms = go_on((speeds_t){500, 500}, (speeds_t){500, 600}, 20000U);
+    const uint32_t took_ms = drive((speeds_t){500, 500}, (speeds_t){500, 600}, 20000U);
     TEST_ASSERT_EQUAL_INT(IW_DIVERGE_AWAY, verdict);
     TEST_ASSERT_UINT32_WITHIN(100, 2215, took_ms);
     TEST_ASSERT_INT32_WITHIN(200, 100000, pair.path_um);
 }
 
 TEST(test_diverge_restart_resets_the_deviation_not_the_largest) {
-    settle((speeds_t){1000, 1000});
-    (void)go_on((speeds_t){1000, 1000}, (speeds_t){0, 1000}, 40U);
+    (void)drive((speeds_t){1000, 1000}, (speeds_t){0, 1000}, 40U);
     TEST_ASSERT_GREATER_THAN_INT32(30000, pair.path_um);
     const int32_t largest_um = pair.largest_um;
     iw_diverge_restart(&pair, now_us);
@@ -230,8 +217,7 @@ TEST(test_diverge_restart_resets_the_deviation_not_the_largest) {
 
 TEST(test_diverge_begin_resets_only_for_a_new_drive) {
     iw_diverge_begin(&pair, 5000U);
-    settle((speeds_t){1000, 1000});
-    (void)go_on((speeds_t){1000, 1000}, (speeds_t){0, 1000}, 40U);
+    (void)drive((speeds_t){1000, 1000}, (speeds_t){0, 1000}, 40U);
     const int32_t path_um = pair.path_um;
     iw_diverge_begin(&pair, 5000U);
     TEST_ASSERT_EQUAL_INT32(path_um, pair.path_um);
@@ -308,8 +294,7 @@ TEST(test_diverge_limit_of_80_percent_is_exact) {
 }
 
 TEST(test_diverge_largest_stays_while_the_deviation_leaks) {
-    settle((speeds_t){1000, 1000});
-    (void)go_on((speeds_t){1000, 1000}, (speeds_t){500, 1000}, 60U);
+    (void)drive((speeds_t){1000, 1000}, (speeds_t){500, 1000}, 60U);
     const int32_t largest_um = pair.largest_um;
     TEST_ASSERT_GREATER_THAN_INT32(20000, largest_um);
     (void)go_on((speeds_t){1000, 1000}, (speeds_t){1000, 1000}, 3000U);
@@ -318,16 +303,13 @@ TEST(test_diverge_largest_stays_while_the_deviation_leaks) {
 }
 
 TEST(test_diverge_names_the_wheel_that_differs_more) {
-    settle((speeds_t){500, 500});
-    (void)go_on((speeds_t){500, 500}, (speeds_t){420, 900}, 1000U);
+    (void)drive((speeds_t){500, 500}, (speeds_t){420, 900}, 1000U);
     TEST_ASSERT_EQUAL_UINT8(IW_RIGHT, pair.side);
     begin();
-    settle((speeds_t){500, 500});
-    (void)go_on((speeds_t){500, 500}, (speeds_t){900, 420}, 1000U);
+    (void)drive((speeds_t){500, 500}, (speeds_t){900, 420}, 1000U);
     TEST_ASSERT_EQUAL_UINT8(IW_LEFT, pair.side);
     begin();
-    settle((speeds_t){500, 500});
-    (void)go_on((speeds_t){500, 500}, (speeds_t){400, 600}, 1000U); // Equal differences: the right wheel
+    (void)drive((speeds_t){500, 500}, (speeds_t){400, 600}, 1000U); // Equal differences: the right wheel
     TEST_ASSERT_EQUAL_UINT8(IW_RIGHT, pair.side);
 }
 

@@ -40,15 +40,18 @@ static mqtt_verdict_t judge_it(const char *verb, uint64_t stamp_us, int seq, con
     return judge_text(verb, text, now_us);
 }
 
+/// The command of `far` is accepted now and becomes this request.
+static void assert_request(const char *verb, int seq, const char *fields, const char *request) {
+    TEST_ASSERT_EQUAL_MESSAGE(MQTT_TAKEN, judge_it(verb, NOW_US, seq, fields, NOW_US), verb);
+    TEST_ASSERT_EQUAL_STRING(request, order.request);
+}
+
 TEST(test_command_fresh_becomes_the_request_of_the_gateway) {
-    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("stop", NOW_US, 1, "", NOW_US));
-    TEST_ASSERT_EQUAL_STRING("{\"cmd\":\"stop\"}", order.request);
-    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("estop", NOW_US, 2, ",\"reason\":\"a \\\"b\\\"\"", NOW_US));
-    TEST_ASSERT_EQUAL_STRING("{\"cmd\":\"estop\",\"reason\":\"a \\\"b\\\"\"}", order.request);
-    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("drive", NOW_US, 3, ",\"left_mm_s\":-5,\"right_mm_s\":7", NOW_US));
-    TEST_ASSERT_EQUAL_STRING("{\"cmd\":\"drive\",\"left_mm_s\":-5,\"right_mm_s\":7}", order.request);
-    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("arm", NOW_US, 4, "", NOW_US));
-    TEST_ASSERT_EQUAL_STRING("{\"cmd\":\"arm\",\"name\":\"mqtt far\",\"t_us\":50000000}", order.request);
+    assert_request("stop", 1, "", "{\"cmd\":\"stop\"}");
+    assert_request("estop", 2, ",\"reason\":\"a \\\"b\\\"\"", "{\"cmd\":\"estop\",\"reason\":\"a \\\"b\\\"\"}");
+    assert_request("drive", 3, ",\"left_mm_s\":-5,\"right_mm_s\":7",
+                   "{\"cmd\":\"drive\",\"left_mm_s\":-5,\"right_mm_s\":7}");
+    assert_request("arm", 4, "", "{\"cmd\":\"arm\",\"name\":\"mqtt far\",\"t_us\":50000000}");
 }
 
 TEST(test_command_age_is_judged_to_the_microsecond) {
@@ -157,17 +160,15 @@ TEST(test_command_reset_needs_its_stop_and_the_drive_age_limit) {
 }
 
 TEST(test_command_key_is_separate_and_a_late_drive_reports_motion) {
-    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("drive", NOW_US, 1, ",\"left_mm_s\":0,\"key\":\"abc\"", NOW_US));
-    TEST_ASSERT_EQUAL_STRING("{\"cmd\":\"drive\",\"left_mm_s\":0}", order.request);
+    assert_request("drive", 1, ",\"left_mm_s\":0,\"key\":\"abc\"", "{\"cmd\":\"drive\",\"left_mm_s\":0}");
     TEST_ASSERT_EQUAL_STRING("abc", order.key);
     TEST_ASSERT_FALSE(order.moves);
     TEST_ASSERT_EQUAL(MQTT_LATE, judge_it("drive", NOW_US, 2, ",\"left_mm_s\":-1", NOW_US + 900000U));
     TEST_ASSERT_TRUE_MESSAGE(order.moves, "dropped, and yet a stick that is held");
     TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_it("twist", NOW_US, 3, ",\"v_mm_s\":0,\"key\":7", NOW_US));
     TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_it("arm", NOW_US, 4, ",\"key\":\"abc\"", NOW_US));
-    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("arm", NOW_US, 5, ",\"takeover\":true", NOW_US));
-    TEST_ASSERT_EQUAL_STRING("{\"cmd\":\"arm\",\"takeover\":true,\"name\":\"mqtt far\",\"t_us\":50000000}",
-                             order.request);
+    assert_request("arm", 5, ",\"takeover\":true",
+                   "{\"cmd\":\"arm\",\"takeover\":true,\"name\":\"mqtt far\",\"t_us\":50000000}");
 }
 
 TEST(test_command_seq_may_restart_only_after_all_earlier_are_late) {
@@ -277,8 +278,7 @@ TEST(test_stop_never_needs_a_sender_a_number_or_a_destination) {
 TEST(test_stop_never_refused_by_mqtt_for_a_field_or_its_reason) {
     char value[5003];
     char request[300];
-    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("stop", NOW_US, 1, ",\"left_mm_s\":1,\"reason\":[]", NOW_US));
-    TEST_ASSERT_EQUAL_STRING("{\"cmd\":\"stop\"}", order.request);
+    assert_request("stop", 1, ",\"left_mm_s\":1,\"reason\":[]", "{\"cmd\":\"stop\"}");
     expect_estop("{\"cmd\":\"estop\",\"reason\":\"line one line two\"}", "\"line one\\nline two\"");
     expect_estop("{\"cmd\":\"estop\",\"reason\":\"a   b\"}", "\"a\\u200eb\",\"key\":{\"cmd\":\"arm\"}");
     expect_estop("{\"cmd\":\"estop\"}", "\"\"");

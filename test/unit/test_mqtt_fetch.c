@@ -41,9 +41,22 @@ static fetch_news_t answer(const char *fields) {
     return fetch_take(&fetch, "reply/me", text, (size_t)length, now_us);
 }
 
-static void list(void) {
+/// The machine answers the first question of each connection.
+static void greet(void) {
     must_ask("hello");
     (void)answer("\"ok\":true");
+}
+
+/// Sends a piece of 9 bytes; `file_crc32` is "null" before the last one.
+static fetch_news_t send_piece(unsigned offset, unsigned size, const char *file_crc32) {
+    char fields[256];
+    (void)snprintf(fields, sizeof fields, "\"ok\":true,\"offset\":%u,\"size\":%u," DATA ",\"file_crc32\":%s", offset,
+                   size, file_crc32);
+    return answer(fields);
+}
+
+static void list(void) {
+    greet();
     must_ask("recordings");
     (void)answer(
         "\"ok\":true,\"recordings\":[{\"name\":\"stop-000003-old\",\"cause\":\"old\",\"wall_us\":5,\"log_bytes\":9,"
@@ -75,16 +88,16 @@ TEST(test_fetch_reads_pieces_and_quotes_the_newest_time) {
     TEST_ASSERT_EQUAL_STRING("{\"from\":\"me\",\"seq\":3,\"boot\":\"aa\",\"t_us\":1000000000,"
                              "\"name\":\"stop-000017-wheel_lost.jsonl\",\"offset\":0}",
                              asked);
-    TEST_ASSERT_EQUAL(FETCH_PIECE, answer("\"ok\":true,\"offset\":0,\"size\":9," DATA ",\"file_crc32\":3421780262"));
+    TEST_ASSERT_EQUAL(FETCH_PIECE, send_piece(0, 9, "3421780262"));
     TEST_ASSERT_EQUAL_size_t(1, fetch.got_file);
     TEST_ASSERT_EQUAL_MEMORY("123456789", fetch.bytes, 9);
     must_ask("recording");
     TEST_ASSERT_NOT_NULL(strstr(asked, "\"t_us\":1000001000,\"name\":\"stop-000017-wheel_lost.log\",\"offset\":0}"));
-    TEST_ASSERT_EQUAL(FETCH_PIECE, answer("\"ok\":true,\"offset\":0,\"size\":18," DATA ",\"file_crc32\":null"));
+    TEST_ASSERT_EQUAL(FETCH_PIECE, send_piece(0, 18, "null"));
     TEST_ASSERT_EQUAL(FETCH_FETCHING, fetch.stage);
     must_ask("recording");
     TEST_ASSERT_NOT_NULL(strstr(asked, "\"offset\":9}"));
-    TEST_ASSERT_EQUAL(FETCH_PIECE, answer("\"ok\":true,\"offset\":9,\"size\":18," DATA ",\"file_crc32\":1266907876"));
+    TEST_ASSERT_EQUAL(FETCH_PIECE, send_piece(9, 18, "1266907876"));
     TEST_ASSERT_EQUAL(FETCH_DONE, fetch.stage);
     TEST_ASSERT_EQUAL_UINT64(0, fetch.again);
 }
@@ -95,11 +108,10 @@ TEST(test_fetch_lost_reply_is_requested_again_with_a_new_time) {
     now_us += 1999999U;
     TEST_ASSERT_FALSE(step());
     now_us++;
-    must_ask("hello");
-    (void)answer("\"ok\":true");
+    greet();
     must_ask("recording");
     TEST_ASSERT_NOT_NULL(strstr(asked, "\"seq\":5,\"boot\":\"aa\",\"t_us\":1002000000,"));
-    TEST_ASSERT_EQUAL(FETCH_PIECE, answer("\"ok\":true,\"offset\":0,\"size\":9," DATA ",\"file_crc32\":3421780262"));
+    TEST_ASSERT_EQUAL(FETCH_PIECE, send_piece(0, 9, "3421780262"));
     TEST_ASSERT_EQUAL_UINT64(1, fetch.again);
 }
 
@@ -119,9 +131,9 @@ TEST(test_fetch_late_reply_is_ignored) {
 TEST(test_fetch_continues_after_a_restart_of_the_bridge) {
     begin_fetching();
     must_ask("recording");
-    (void)answer("\"ok\":true,\"offset\":0,\"size\":9," DATA ",\"file_crc32\":3421780262");
+    (void)send_piece(0, 9, "3421780262");
     must_ask("recording");
-    (void)answer("\"ok\":true,\"offset\":0,\"size\":18," DATA ",\"file_crc32\":null");
+    (void)send_piece(0, 18, "null");
     must_ask("recording");
     boot = "bb";
     (void)answer(
@@ -129,7 +141,7 @@ TEST(test_fetch_continues_after_a_restart_of_the_bridge) {
     must_ask("recording");
     TEST_ASSERT_NOT_NULL(strstr(asked, "\"boot\":\"bb\""));
     TEST_ASSERT_NOT_NULL(strstr(asked, "\"offset\":9}"));
-    (void)answer("\"ok\":true,\"offset\":9,\"size\":18," DATA ",\"file_crc32\":1266907876");
+    (void)send_piece(9, 18, "1266907876");
     TEST_ASSERT_EQUAL(FETCH_DONE, fetch.stage);
 }
 
@@ -140,10 +152,9 @@ TEST(test_fetch_machine_back_within_the_patience_continues) {
         TEST_ASSERT_TRUE(step());
         now_us += 2U * SECOND_US;
     }
-    must_ask("hello");
-    (void)answer("\"ok\":true");
+    greet();
     must_ask("recording");
-    TEST_ASSERT_EQUAL(FETCH_PIECE, answer("\"ok\":true,\"offset\":0,\"size\":9," DATA ",\"file_crc32\":3421780262"));
+    TEST_ASSERT_EQUAL(FETCH_PIECE, send_piece(0, 9, "3421780262"));
 }
 
 TEST(test_fetch_machine_that_stays_offline_fails_with_the_reason) {
@@ -182,7 +193,7 @@ TEST(test_fetch_incomplete_file_is_never_done) {
     begin_fetching();
     for (unsigned i = 0; i < 6U; i++) {
         must_ask("recording");
-        TEST_ASSERT_EQUAL(FETCH_NOTHING, answer("\"ok\":true,\"offset\":0,\"size\":9," DATA ",\"file_crc32\":7"));
+        TEST_ASSERT_EQUAL(FETCH_NOTHING, send_piece(0, 9, "7"));
     }
     TEST_ASSERT_EQUAL(FETCH_FAILED, fetch.stage);
 }
@@ -200,8 +211,7 @@ TEST(test_fetch_permanent_refusal_fails_temporary_one_is_retried) {
         TEST_ASSERT_EQUAL(i == 0U, step());
         now_us += (i > 0U) ? SECOND_US / 2U : 0U;
         if (i > 0U) {
-            must_ask("hello");
-            (void)answer("\"ok\":true");
+            greet();
             must_ask("recording");
         }
         (void)answer("\"ok\":false,\"error\":\"denied\",\"message\":\"still being read\"");
@@ -240,8 +250,7 @@ TEST(test_fetch_recording_is_selected_by_name_or_number) {
 }
 
 TEST(test_fetch_without_recordings_fails_with_the_reason) {
-    must_ask("hello");
-    (void)answer("\"ok\":true");
+    greet();
     must_ask("recordings");
     (void)answer("\"ok\":true,\"recordings\":[]");
     fetch_choose(&fetch, NULL, now_us);

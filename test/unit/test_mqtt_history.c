@@ -41,6 +41,10 @@ static const char *text(void) {
     return printed;
 }
 
+static void assert_printed(const char *words) {
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text(), words), printed);
+}
+
 /// Adds a stop of w1: boot, number of the event, number of the stop, seconds after EVENING_US of receipt and of
 /// storage.
 static void stop(const char *boot, int number, int stop_number, int received_s, int stored_s) {
@@ -64,8 +68,7 @@ TEST(test_history_stop_is_one_line_with_time_and_sentence) {
     stop("a", 1, 1, 61, 62);
     TEST_ASSERT_EQUAL_STRING("2026-11-21 22:01:01 w1           stop   stop number 1\n", text());
     history_sum(&history, "n1");
-    TEST_ASSERT_NOT_NULL(
-        strstr(text(), "1 stop of 1 machine, 2026-11-21 22:00:00 to 2026-11-21 23:00:00, from the stream at n1\n"));
+    assert_printed("1 stop of 1 machine, 2026-11-21 22:00:00 to 2026-11-21 23:00:00, from the stream at n1\n");
 }
 
 TEST(test_history_doubles_are_dropped_across_bridge_restarts) {
@@ -97,7 +100,7 @@ TEST(test_history_gap_in_stops_is_printed_and_counts_from_restart) {
     begin((history_config_t){0});
     stop("a", 1, 7, 1, 1);
     stop("a", 2, 10, 2, 2);
-    TEST_ASSERT_NOT_NULL(strstr(text(), "-- 2 stops before this one are not in the stream"));
+    assert_printed("-- 2 stops before this one are not in the stream");
     stop("a", 3, 1, 3, 3);
     TEST_ASSERT_EQUAL_UINT64(2, history.stops_missing);
     stop("a", 4, 3, 4, 4);
@@ -111,7 +114,7 @@ TEST(test_history_gap_among_hidden_events_is_printed_at_next_stop) {
           "{\"id\":\"a-4\",\"heard_wall_us\":1795298401000000,\"event\":\"fault\",\"cause\":\"bus\",\"present\":true}");
     TEST_ASSERT_NULL(strstr(text(), "fault"));
     stop("a", 5, 2, 2, 2);
-    TEST_ASSERT_NOT_NULL(strstr(text(), "-- 2 events before this one are not in the stream"));
+    assert_printed("-- 2 events before this one are not in the stream");
 }
 
 TEST(test_history_late_event_is_no_double_and_closes_its_gap) {
@@ -121,7 +124,7 @@ TEST(test_history_late_event_is_no_double_and_closes_its_gap) {
     TEST_ASSERT_EQUAL_UINT64(3, history.missing);
     TEST_ASSERT_EQUAL_UINT64(3, history.stops_missing);
     stop("a", 3, 3, 1, 3);
-    TEST_ASSERT_NOT_NULL(strstr(text(), "stop number 3"));
+    assert_printed("stop number 3");
     stop("a", 3, 3, 1, 3);
     TEST_ASSERT_EQUAL_UINT64(1, history.doubled);
     TEST_ASSERT_EQUAL_UINT64(2, history.missing);
@@ -149,12 +152,10 @@ TEST(test_history_gap_at_the_end_shows_by_info) {
     info("a", 7, 30, 12, 0, 0);
     stop("a", 4, 4, 1, 1);
     history_end(&history);
-    TEST_ASSERT_NOT_NULL(strstr(text(),
-                                "-- 3 stops after its last one here are not in the stream; its info names stop 7 "
-                                "of 2026-11-21 22:00:30"));
-    TEST_ASSERT_NOT_NULL(strstr(printed,
-                                "-- 8 events after its last one here are not in the stream: the broker confirmed "
-                                "them and did not store them; its spool dropped none"));
+    assert_printed("-- 3 stops after its last one here are not in the stream; its info names stop 7 "
+                   "of 2026-11-21 22:00:30");
+    assert_printed("-- 8 events after its last one here are not in the stream: the broker confirmed "
+                   "them and did not store them; its spool dropped none");
     TEST_ASSERT_EQUAL_UINT64(3, history.stops_missing);
 }
 
@@ -184,7 +185,7 @@ TEST(test_history_with_an_unchecked_end_reports_it) {
     history.has_info = false;
     history_end(&history);
     history_sum(&history, "n1");
-    TEST_ASSERT_NOT_NULL(strstr(text(), "; its end is not checked"));
+    assert_printed("; its end is not checked");
 }
 
 TEST(test_history_gap_is_printed_with_its_cause) {
@@ -192,12 +193,12 @@ TEST(test_history_gap_is_printed_with_its_cause) {
     info("a", 4, 1, 9, 0, 5);
     stop("a", 1, 1, 1, 1);
     stop("a", 9, 2, 2, 2);
-    TEST_ASSERT_NOT_NULL(strstr(text(), "its full spool dropped 5 events"));
+    assert_printed("its full spool dropped 5 events");
     tearDown();
     begin((history_config_t){0});
     stop("a", 1, 1, 1, 1);
     stop("a", 9, 2, 2, 2);
-    TEST_ASSERT_NOT_NULL(strstr(text(), "dropped from its full spool, or confirmed by the broker and not stored"));
+    assert_printed("dropped from its full spool, or confirmed by the broker and not stored");
 }
 
 TEST(test_history_all_has_other_events_and_bridge_restarts) {
@@ -205,8 +206,8 @@ TEST(test_history_all_has_other_events_and_bridge_restarts) {
     stop("a", 1, 1, 1, 1);
     other("fault",
           "{\"id\":\"b-2\",\"heard_wall_us\":1795298401000000,\"event\":\"fault\",\"cause\":\"bus\",\"present\":true}");
-    TEST_ASSERT_NOT_NULL(strstr(text(), "w1           -- its bridge restarted: boot b\n"));
-    TEST_ASSERT_NOT_NULL(strstr(printed, "w1           fault  cause bus, present true\n"));
+    assert_printed("w1           -- its bridge restarted: boot b\n");
+    assert_printed("w1           fault  cause bus, present true\n");
 }
 
 TEST(test_history_span_accepts_either_clock_of_an_event) {
@@ -217,18 +218,16 @@ TEST(test_history_span_accepts_either_clock_of_an_event) {
     stop("a", 4, 4, 1000000, 20);
     stop("a", 5, 5, 3600, 3601);
     TEST_ASSERT_EQUAL_UINT64(3, history.printed);
-    TEST_ASSERT_NOT_NULL(strstr(text(), "stop number 2 (stored 2026-11-22 00:30:00)\n"));
-    TEST_ASSERT_NOT_NULL(strstr(printed, "stop number 3 (stored 2026-11-21 22:00:10)\n"));
-    TEST_ASSERT_NOT_NULL(
-        strstr(printed, "stop number 4 (THE CLOCK OF THIS MACHINE IS WRONG: stored 2026-11-21 22:00:20)\n"));
+    assert_printed("stop number 2 (stored 2026-11-22 00:30:00)\n");
+    assert_printed("stop number 3 (stored 2026-11-21 22:00:10)\n");
+    assert_printed("stop number 4 (THE CLOCK OF THIS MACHINE IS WRONG: stored 2026-11-21 22:00:20)\n");
 }
 
 TEST(test_history_missed_stop_has_its_own_time_and_a_late_mark) {
     begin((history_config_t){0});
     other("stop", "{\"id\":\"a-1\",\"heard_wall_us\":1795302000000001,\"event\":\"stop\",\"missed\":true,\"number\":4,"
                   "\"cause\":\"wheel_lost\",\"wall_us\":1795298460000000,\"sentence\":\"gone\"}");
-    TEST_ASSERT_NOT_NULL(
-        strstr(text(), "2026-11-21 22:01:00 w1           stop   gone (reported late: its bridge did not run)"));
+    assert_printed("2026-11-21 22:01:00 w1           stop   gone (reported late: its bridge did not run)");
 }
 
 TEST(test_history_json_nests_the_message_and_ends_with_the_sum) {
@@ -236,12 +235,11 @@ TEST(test_history_json_nests_the_message_and_ends_with_the_sum) {
     stop("a", 1, 1, 1, 2);
     stop("b", 4, 4, 2, 3);
     history_sum(&history, "n1");
-    TEST_ASSERT_NOT_NULL(strstr(text(),
-                                "{\"machine\":\"w1\",\"wall_us\":1795298401000000,\"stored_wall_us\":1795298402000000,"
-                                "\"missing_before\":0,\"stops_missing_before\":0,\"bridge_began_anew\":false,"
-                                "\"message\":{\"id\":\"a-1\""));
-    TEST_ASSERT_NOT_NULL(strstr(printed, "\"missing_before\":2,\"stops_missing_before\":2,\"bridge_began_anew\":true"));
-    TEST_ASSERT_NOT_NULL(strstr(printed, "{\"events\":2,\"machines\":1,\"doubled\":0,\"garbled\":0,\"missing\":2,"));
+    assert_printed("{\"machine\":\"w1\",\"wall_us\":1795298401000000,\"stored_wall_us\":1795298402000000,"
+                   "\"missing_before\":0,\"stops_missing_before\":0,\"bridge_began_anew\":false,"
+                   "\"message\":{\"id\":\"a-1\"");
+    assert_printed("\"missing_before\":2,\"stops_missing_before\":2,\"bridge_began_anew\":true");
+    assert_printed("{\"events\":2,\"machines\":1,\"doubled\":0,\"garbled\":0,\"missing\":2,");
 }
 
 TEST(test_history_garbage_is_counted_and_prints_no_escape) {

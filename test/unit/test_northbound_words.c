@@ -13,18 +13,15 @@ static const iwn_why_context_t context = {"\"joystick\" (client 3, pid 9)", "ker
 
 static const char *sentence(iw_cause_t cause, uint8_t sides, uint32_t detail) {
     static char text[IWN_SENTENCE_SIZE];
-    iw_stop_t stop;
-    memset(&stop, 0, sizeof stop);
-    stop.number = 1;
-    stop.cause = cause;
-    stop.sides = sides;
-    stop.detail = detail;
-    stop.from = IW_STATE_ARMED;
-    stop.at_us = 12345678;
-    stop.latched = cause < IW_CAUSE_LOOP_LATE;
-    stop.at_once = cause <= IW_CAUSE_LOOP_LATE;
-    stop.applied.wheel[IW_LEFT].speed_mm_s = 300;
-    stop.applied.wheel[IW_RIGHT].speed_mm_s = -299;
+    const iw_stop_t stop = {.number = 1,
+                            .cause = cause,
+                            .sides = sides,
+                            .detail = detail,
+                            .from = IW_STATE_ARMED,
+                            .at_us = 12345678,
+                            .latched = cause < IW_CAUSE_LOOP_LATE,
+                            .at_once = cause <= IW_CAUSE_LOOP_LATE,
+                            .applied = {.wheel = {{.speed_mm_s = 300}, {.speed_mm_s = -299}}}};
     iwn_why_sentence(&stop, &context, text, sizeof text);
     return text;
 }
@@ -51,13 +48,8 @@ TEST(test_why_names_cause_numbers_time_and_fix) {
 }
 
 TEST(test_why_reports_for_each_stop_whether_it_ramped) {
-    iw_stop_t stop;
+    iw_stop_t stop = {.number = 1, .cause = IW_CAUSE_WHEEL_LOST, .from = IW_STATE_ARMED, .latched = true};
     char text[IWN_SENTENCE_SIZE];
-    memset(&stop, 0, sizeof stop);
-    stop.number = 1;
-    stop.cause = IW_CAUSE_WHEEL_LOST;
-    stop.from = IW_STATE_ARMED;
-    stop.latched = true;
     iwn_why_sentence(&stop, &context, text, sizeof text);
     TEST_ASSERT_NOT_NULL(strstr(text, "; ramped to zero, latched at"));
     stop.cause = IW_CAUSE_PAIR_DIVERGES;
@@ -70,12 +62,8 @@ TEST(test_why_reports_for_each_stop_whether_it_ramped) {
 }
 
 TEST(test_why_after_a_crash_has_no_unknown_values) {
-    iw_stop_t stop;
+    const iw_stop_t stop = {.number = 1, .cause = IW_CAUSE_RESTART, .at_once = true};
     char text[IWN_SENTENCE_SIZE];
-    memset(&stop, 0, sizeof stop);
-    stop.number = 1;
-    stop.cause = IW_CAUSE_RESTART;
-    stop.at_once = true;
     iwn_why_sentence(&stop, &context, text, sizeof text);
     TEST_ASSERT_EQUAL_STRING(
         "the gateway before this one died while the wheels were armed; set to zero immediately at 0.000 s; "
@@ -97,9 +85,8 @@ TEST(test_why_has_a_sentence_and_a_name_for_every_cause) {
 }
 
 TEST(test_why_without_a_stop_reports_no_stop) {
+    const iw_stop_t stop = {.number = 0};
     char text[IWN_SENTENCE_SIZE];
-    iw_stop_t stop;
-    memset(&stop, 0, sizeof stop);
     iwn_why_sentence(&stop, &context, text, sizeof text);
     TEST_ASSERT_EQUAL_STRING("no stop since the gateway started", text);
 }
