@@ -1,7 +1,15 @@
 // SPDX-License-Identifier: MIT
 #include "force_rig.h"
 
+#include "unity.h"
+
 #include <string.h>
+
+force_rig_t rig;
+
+void setUp(void) {
+    force_rig_init(&rig);
+}
 
 void force_rig_init(force_rig_t *self) {
     fixture_config(&self->config);

@@ -12,6 +12,8 @@ typedef struct {
     iw_time_us_t now_us;
 } force_rig_t;
 
+extern force_rig_t rig;
+
 /// Begins with a wheel whose first telemetry comes while it is already running; the left one, in cN.
 void force_rig_init(force_rig_t *self);
 

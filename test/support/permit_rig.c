@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "permit_rig.h"
 
+#include "unity.h"
+
 #include <string.h>
 
 static void start(permit_rig_t *self, bool restarted) {
@@ -28,12 +30,6 @@ void permit_rig_init_restarted(permit_rig_t *self) {
     start(self, true);
 }
 
-static void arm_and_prove(permit_rig_t *self) {
-    self->view.proven = true;
-    permit_rig_step(self);
-    self->view.proven = false;
-}
-
 /// Moving, with a valid lease.
 static void drive_off(permit_rig_t *self) {
     self->view.output_zero = false;
@@ -59,7 +55,7 @@ void permit_rig_begin(permit_rig_t *self, permit_situation_t situation) {
         permit_rig_step(self);
         return;
     }
-    arm_and_prove(self);
+    permit_rig_prove(self);
     drive_off(self);
     if (situation == PERMIT_STOPPING || situation == PERMIT_HOLDING) {
         iw_permit_stop(&self->permit, self->now_us, HOLDER, IW_CAUSE_CLIENT_STOP);
@@ -82,6 +78,17 @@ void permit_rig_step(permit_rig_t *self) {
 void permit_rig_wait(permit_rig_t *self, iw_time_us_t for_us) {
     self->now_us += for_us;
     permit_rig_step(self);
+}
+
+void permit_rig_prove(permit_rig_t *self) {
+    self->view.proven = true;
+    permit_rig_step(self);
+    self->view.proven = false;
+}
+
+void permit_rig_assert(const permit_rig_t *self, iw_state_t state, iw_demand_t demand) {
+    TEST_ASSERT_EQUAL_INT(state, iw_permit_state(&self->permit));
+    TEST_ASSERT_EQUAL_INT(demand, iw_permit_demand(&self->permit));
 }
 
 void permit_rig_raise(permit_rig_t *self, iw_cause_t cause) {

@@ -43,6 +43,12 @@ void permit_rig_step(permit_rig_t *self);
 /// Lets time pass, then makes one step.
 void permit_rig_wait(permit_rig_t *self, iw_time_us_t for_us);
 
+/// Makes one step in which the arming pair is echoed.
+void permit_rig_prove(permit_rig_t *self);
+
+/// Asserts the state and the demand.
+void permit_rig_assert(const permit_rig_t *self, iw_state_t state, iw_demand_t demand);
+
 /// Raises a cause now, for both wheels, with detail 42.
 void permit_rig_raise(permit_rig_t *self, iw_cause_t cause);
 

@@ -3,16 +3,6 @@
 #include "force_rig.h"
 #include "unit.h"
 
-static force_rig_t rig;
-
-void setUp(void) {
-    force_rig_init(&rig);
-}
-
-static void begin(iw_side_t side, bool boot_seen) {
-    force_rig_begin(&rig, side, boot_seen);
-}
-
 static void assert_offset(iw_offset_provenance_t provenance, int32_t offset_mN) {
     TEST_ASSERT_EQUAL_INT(provenance, rig.force.provenance);
     TEST_ASSERT_EQUAL_INT32(offset_mN, rig.force.offset_mN);
@@ -49,7 +39,7 @@ TEST(test_force_estimate_does_not_replace_offset_of_the_wheel) {
 }
 
 TEST(test_force_offset_of_a_loaded_start_is_never_used) {
-    begin(IW_LEFT, true);
+    force_rig_begin(&rig, IW_LEFT, true);
     force_rig_quiet(&rig, 20, 100);
     force_rig_offset(&rig, 100);
     assert_offset(IW_OFFSET_NONE, 0);
@@ -64,7 +54,7 @@ TEST(test_force_offset_of_a_loaded_start_is_never_used) {
 }
 
 TEST(test_force_offset_of_a_good_start_is_used_after_the_window) {
-    begin(IW_LEFT, true);
+    force_rig_begin(&rig, IW_LEFT, true);
     force_rig_quiet(&rig, 39, 1000);
     force_rig_offset(&rig, 100);
     assert_offset(IW_OFFSET_NONE, 0);
@@ -303,13 +293,13 @@ TEST(test_force_contradicted_unit_is_invalid_and_never_rescaled) {
     for (int side = 0; side < IW_SIDES; side++) {
         const int16_t wrong = (side == IW_LEFT) ? 100 : 1000;
         const int16_t right = (side == IW_LEFT) ? 1000 : 100;
-        begin((iw_side_t)side, false);
+        force_rig_begin(&rig, (iw_side_t)side, false);
         force_rig_quiet(&rig, 40, wrong);
         force_rig_offset(&rig, 100);
         TEST_ASSERT_EQUAL_INT(IW_FORCE_UNIT_CONTRADICTED, force_rig_validity(&rig));
         TEST_ASSERT_EQUAL_INT32((side == IW_LEFT) ? 1000 : 100000, iw_force_raw_mN(&rig.force));
         TEST_ASSERT_EQUAL_INT(IW_FORCE_UNIT_CONTRADICTED, force_rig_validity(&rig));
-        begin((iw_side_t)side, false);
+        force_rig_begin(&rig, (iw_side_t)side, false);
         force_rig_quiet(&rig, 40, right);
         force_rig_offset(&rig, 100);
         TEST_ASSERT_EQUAL_INT(IW_FORCE_VALID, force_rig_validity(&rig));
@@ -349,20 +339,20 @@ TEST(test_force_is_invalid_only_during_saturated_samples) {
 }
 
 TEST(test_force_extremes_do_not_overflow) {
-    begin(IW_RIGHT, false);
+    force_rig_begin(&rig, IW_RIGHT, false);
     force_rig_offset(&rig, -32768);
     force_rig_hear(&rig, 32767, true);
     TEST_ASSERT_EQUAL_INT32(3276700, iw_force_raw_mN(&rig.force));
     TEST_ASSERT_EQUAL_INT32(6553500, iw_force_net_mN(&rig.force));
-    begin(IW_RIGHT, false);
+    force_rig_begin(&rig, IW_RIGHT, false);
     force_rig_offset(&rig, 32767);
     force_rig_hear(&rig, -32768, true);
     TEST_ASSERT_EQUAL_INT32(-6553500, iw_force_net_mN(&rig.force));
-    begin(IW_LEFT, false);
+    force_rig_begin(&rig, IW_LEFT, false);
     force_rig_quiet(&rig, 40, -32767);
     force_rig_offset(&rig, -32768);
     TEST_ASSERT_EQUAL_INT(IW_UNIT_DN, rig.force.observation);
-    begin(IW_LEFT, false);
+    force_rig_begin(&rig, IW_LEFT, false);
     force_rig_quiet(&rig, 40, 32766);
     force_rig_offset(&rig, -32768);
     TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, rig.force.observation);

@@ -3,16 +3,6 @@
 #include "force_rig.h"
 #include "unit.h"
 
-static force_rig_t rig;
-
-void setUp(void) {
-    force_rig_init(&rig);
-}
-
-static void begin(iw_side_t side, bool boot_seen) {
-    force_rig_begin(&rig, side, boot_seen);
-}
-
 static void assert_window(iw_window_t expected) {
     TEST_ASSERT_EQUAL_INT(expected, rig.force.quality.window);
     TEST_ASSERT_EQUAL_INT((expected == IW_WINDOW_GOOD) ? IW_OFFSET_ESTIMATED : IW_OFFSET_NONE, rig.force.provenance);
@@ -58,7 +48,7 @@ TEST(test_force_measure_uses_the_requested_wheel) {
 }
 
 TEST(test_force_units_are_per_side_as_documented_or_configured) {
-    begin(IW_RIGHT, false);
+    force_rig_begin(&rig, IW_RIGHT, false);
     force_rig_quiet(&rig, 40, -77);
     TEST_ASSERT_EQUAL_INT32(-7700, rig.force.offset_mN);
     force_rig_hear(&rig, 100, true);
@@ -66,10 +56,10 @@ TEST(test_force_units_are_per_side_as_documented_or_configured) {
     TEST_ASSERT_EQUAL_INT32(17700, iw_force_net_mN(&rig.force));
     rig.config.force_unit[IW_LEFT] = IW_FORCE_DN;
     rig.config.force_unit[IW_RIGHT] = IW_FORCE_CN;
-    begin(IW_RIGHT, false);
+    force_rig_begin(&rig, IW_RIGHT, false);
     force_rig_hear(&rig, 100, true);
     TEST_ASSERT_EQUAL_INT32(1000, iw_force_raw_mN(&rig.force));
-    begin(IW_LEFT, false);
+    force_rig_begin(&rig, IW_LEFT, false);
     force_rig_hear(&rig, 100, true);
     TEST_ASSERT_EQUAL_INT32(10000, iw_force_raw_mN(&rig.force));
 }
@@ -79,15 +69,15 @@ TEST(test_force_noise_up_to_1_N_is_quiet_and_more_is_noisy) {
     assert_window(IW_WINDOW_GOOD);
     TEST_ASSERT_EQUAL_UINT32(1000, rig.force.quality.deviation_mN);
     TEST_ASSERT_EQUAL_INT32(6000, rig.force.offset_mN);
-    begin(IW_LEFT, false);
+    force_rig_begin(&rig, IW_LEFT, false);
     force_rig_alternate(&rig, 500, 702);
     assert_window(IW_WINDOW_NOISY);
     TEST_ASSERT_EQUAL_UINT32(1010, rig.force.quality.deviation_mN);
-    begin(IW_RIGHT, false);
+    force_rig_begin(&rig, IW_RIGHT, false);
     force_rig_alternate(&rig, -10, 10);
     assert_window(IW_WINDOW_GOOD);
     TEST_ASSERT_EQUAL_UINT32(1000, rig.force.quality.deviation_mN);
-    begin(IW_RIGHT, false);
+    force_rig_begin(&rig, IW_RIGHT, false);
     force_rig_alternate(&rig, -11, 11);
     assert_window(IW_WINDOW_NOISY);
 }
@@ -115,7 +105,7 @@ static void receive_pairs(uint32_t pairs, int16_t by) {
 }
 
 TEST(test_force_large_deviation_is_exact) {
-    begin(IW_RIGHT, false);
+    force_rig_begin(&rig, IW_RIGHT, false);
     force_rig_alternate(&rig, 0, 800);
     TEST_ASSERT_EQUAL_UINT32(40000, rig.force.quality.deviation_mN);
 }
@@ -124,7 +114,7 @@ TEST(test_force_deviation_is_finer_up_to_a_variance_of_400000) {
     receive_pairs(2, 2000);
     receive_pairs(18, 0);
     TEST_ASSERT_EQUAL_UINT32(6324, rig.force.quality.deviation_mN); // The root of 400 000 is 632.4.
-    begin(IW_LEFT, false);
+    force_rig_begin(&rig, IW_LEFT, false);
     receive_pairs(2, 2000);
     receive_pairs(1, 2);
     receive_pairs(17, 1);
@@ -146,11 +136,11 @@ TEST(test_force_noise_1_mN_beyond_1_N_is_noisy) {
 
 TEST(test_force_extreme_noise_does_not_overflow) {
     for (int side = 0; side < IW_SIDES; side++) {
-        begin((iw_side_t)side, false);
+        force_rig_begin(&rig, (iw_side_t)side, false);
         force_rig_alternate(&rig, 32766, -32767);
         assert_window(IW_WINDOW_NOISY);
         TEST_ASSERT_EQUAL_UINT32((side == IW_LEFT) ? 81910 : 819100, rig.force.quality.deviation_mN); // Limited
-        begin((iw_side_t)side, false);
+        force_rig_begin(&rig, (iw_side_t)side, false);
         force_rig_alternate(&rig, 0, 1400);
         assert_window(IW_WINDOW_NOISY);
         TEST_ASSERT_UINT32_WITHIN(100, (side == IW_LEFT) ? 7000 : 70000, rig.force.quality.deviation_mN);
@@ -168,13 +158,13 @@ TEST(test_force_drift_up_to_1_N_is_quiet_and_more_is_drift) {
     assert_window(IW_WINDOW_GOOD);
     TEST_ASSERT_EQUAL_INT32(1000, rig.force.quality.drift_mN);
     TEST_ASSERT_EQUAL_UINT32(500, rig.force.quality.deviation_mN); // From the mean of the full window
-    begin(IW_LEFT, false);
+    force_rig_begin(&rig, IW_LEFT, false);
     step_at_half(1000, 1101);
     assert_window(IW_WINDOW_DRIFT);
-    begin(IW_LEFT, false);
+    force_rig_begin(&rig, IW_LEFT, false);
     step_at_half(1000, 900);
     assert_window(IW_WINDOW_GOOD);
-    begin(IW_LEFT, false);
+    force_rig_begin(&rig, IW_LEFT, false);
     step_at_half(1000, 899);
     assert_window(IW_WINDOW_DRIFT);
     TEST_ASSERT_EQUAL_INT32(-1010, rig.force.quality.drift_mN);
@@ -191,7 +181,7 @@ TEST(test_force_drift_1_mN_beyond_1_N_is_drift) {
 TEST(test_force_motion_at_any_sample_contaminates_the_window) {
     static const uint32_t moments[] = {0, 1, 20, 38, 39};
     for (size_t i = 0; i < 5; i++) {
-        begin(IW_LEFT, false);
+        force_rig_begin(&rig, IW_LEFT, false);
         for (uint32_t n = 0; n < 40; n++) {
             force_rig_hear(&rig, 100, n != moments[i]);
         }
@@ -203,13 +193,13 @@ TEST(test_force_motion_at_any_sample_contaminates_the_window) {
 TEST(test_force_saturated_sample_contaminates_the_window) {
     static const int16_t limits[] = {32767, -32768};
     for (size_t i = 0; i < 2; i++) {
-        begin(IW_LEFT, false);
+        force_rig_begin(&rig, IW_LEFT, false);
         force_rig_quiet(&rig, 39, limits[i]);
         TEST_ASSERT_EQUAL_INT(IW_FORCE_SATURATED, force_rig_validity(&rig));
         force_rig_quiet(&rig, 1, limits[i]);
         assert_window(IW_WINDOW_SATURATED);
     }
-    begin(IW_RIGHT, false);
+    force_rig_begin(&rig, IW_RIGHT, false);
     force_rig_hear(&rig, 32767, false);
     force_rig_quiet(&rig, 39, 0);
     assert_window(IW_WINDOW_SATURATED);
@@ -219,7 +209,7 @@ TEST(test_force_saturated_sample_contaminates_the_window) {
 TEST(test_force_5_N_from_a_stored_offset_is_a_load) {
     static const int32_t stored_mN[] = {-5000, 5000, -5001, 5001};
     for (size_t i = 0; i < 4; i++) {
-        begin(IW_LEFT, true);
+        force_rig_begin(&rig, IW_LEFT, true);
         iw_force_restore(&rig.force, IW_OFFSET_STORED, stored_mN[i]);
         force_rig_quiet(&rig, 40, 0);
         const bool loaded = i >= 2;
@@ -230,7 +220,7 @@ TEST(test_force_5_N_from_a_stored_offset_is_a_load) {
 }
 
 TEST(test_force_estimate_of_an_unseen_start_leaves_a_stored_offset) {
-    begin(IW_LEFT, false);
+    force_rig_begin(&rig, IW_LEFT, false);
     iw_force_restore(&rig.force, IW_OFFSET_STORED, 4000);
     force_rig_quiet(&rig, 40, 0);
     TEST_ASSERT_EQUAL_INT(IW_WINDOW_GOOD, rig.force.quality.window);
@@ -256,7 +246,7 @@ TEST(test_force_gap_restarts_the_window) {
     rig.now_us += MS(200) - 1U;
     force_rig_hear(&rig, 100, true);
     assert_window(IW_WINDOW_GOOD);
-    begin(IW_LEFT, false);
+    force_rig_begin(&rig, IW_LEFT, false);
     force_rig_quiet(&rig, 39, 30000);
     rig.now_us += MS(200);
     force_rig_hear(&rig, 100, true);
@@ -288,7 +278,7 @@ TEST(test_force_estimate_is_made_once) {
 }
 
 static iw_unit_observation_t unit_of(iw_side_t side, int16_t raw, int16_t offset_dN) {
-    begin(side, false);
+    force_rig_begin(&rig, side, false);
     force_rig_quiet(&rig, 40, raw);
     force_rig_offset(&rig, offset_dN);
     return rig.force.observation;

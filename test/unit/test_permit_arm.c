@@ -12,17 +12,14 @@ void setUp(void) {
 static void assert_arm_refused(iw_refusal_t expected) {
     TEST_ASSERT_EQUAL_INT(expected, permit_rig_arm(&rig, HOLDER));
     TEST_ASSERT_FALSE(iw_permit_arming(&rig.permit));
-    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_permit_state(&rig.permit));
-    TEST_ASSERT_EQUAL_INT(IW_DEMAND_SILENCE, iw_permit_demand(&rig.permit));
-    rig.view.proven = true;
-    permit_rig_step(&rig);
+    permit_rig_assert(&rig, IW_STATE_LISTENING, IW_DEMAND_SILENCE);
+    permit_rig_prove(&rig);
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_permit_state(&rig.permit));
     TEST_ASSERT_EQUAL_INT(IW_CLIENT_NONE, rig.permit.holder);
 }
 
 TEST(test_permit_starts_listening_and_sends_nothing) {
-    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_permit_state(&rig.permit));
-    TEST_ASSERT_EQUAL_INT(IW_DEMAND_SILENCE, iw_permit_demand(&rig.permit));
+    permit_rig_assert(&rig, IW_STATE_LISTENING, IW_DEMAND_SILENCE);
     TEST_ASSERT_EQUAL_INT(IW_CLIENT_NONE, rig.permit.holder);
     TEST_ASSERT_EQUAL_UINT32(0, rig.permit.stop.number);
     TEST_ASSERT_TRUE(iw_permit_next_us(&rig.permit) == IW_NEVER);
@@ -48,8 +45,7 @@ TEST(test_permit_arm_sends_zeros_and_is_armed_after_their_echoes) {
     rig.view.proven = true;
     permit_rig_wait(&rig, MS(10));
     TEST_ASSERT_FALSE(iw_permit_arming(&rig.permit));
-    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_permit_state(&rig.permit));
-    TEST_ASSERT_EQUAL_INT(IW_DEMAND_FOLLOW, iw_permit_demand(&rig.permit));
+    permit_rig_assert(&rig, IW_STATE_ARMED, IW_DEMAND_FOLLOW);
     TEST_ASSERT_EQUAL_INT(HOLDER, rig.permit.holder);
 }
 
@@ -65,8 +61,7 @@ TEST(test_permit_arm_without_echo_in_time_is_send_stalled) {
     permit_rig_wait(&rig, 1);
     TEST_ASSERT_FALSE(iw_permit_arming(&rig.permit));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_SEND_STALLED, rig.permit.arm_refusal);
-    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_permit_state(&rig.permit));
-    TEST_ASSERT_EQUAL_INT(IW_DEMAND_SILENCE, iw_permit_demand(&rig.permit));
+    permit_rig_assert(&rig, IW_STATE_LISTENING, IW_DEMAND_SILENCE);
     rig.view.proven = true;
     permit_rig_wait(&rig, 1);
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_permit_state(&rig.permit));
@@ -159,7 +154,6 @@ TEST(test_permit_arm_with_a_cause_present_is_refused) {
         TEST_ASSERT_EQUAL_INT(levels[i].refusal, permit_rig_arm(&rig, HOLDER));
         permit_rig_step(&rig);
         assert_arm_refused(levels[i].refusal);
-        rig.view.proven = false;
         permit_rig_step(&rig);
         TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
     }
@@ -179,7 +173,6 @@ TEST(test_permit_arm_within_a_second_of_an_event_is_refused) {
         permit_rig_raise(&rig, events[i].cause);
         permit_rig_wait(&rig, MS(1000) - 1U);
         assert_arm_refused(events[i].refusal);
-        rig.view.proven = false;
         permit_rig_wait(&rig, 1);
         TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
     }
@@ -202,7 +195,6 @@ TEST(test_permit_arm_after_a_drive_of_any_client_is_stale_command) {
     permit_rig_wait(&rig, MS(500) - 1U);
     assert_arm_refused(IW_REFUSE_STALE_COMMAND);
     TEST_ASSERT_EQUAL_INT(OTHER, rig.permit.stale_client);
-    rig.view.proven = false;
     permit_rig_wait(&rig, 2);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
 }
@@ -269,8 +261,7 @@ TEST(test_permit_arming_ends_by_stop_and_disconnect_of_its_client) {
     iw_permit_stop(&rig.permit, rig.now_us, OTHER, IW_CAUSE_CLIENT_STOP);
     TEST_ASSERT_FALSE(iw_permit_arming(&rig.permit));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_ARMED, rig.permit.arm_refusal);
-    rig.view.proven = true;
-    permit_rig_step(&rig);
+    permit_rig_prove(&rig);
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_permit_state(&rig.permit));
 
     permit_rig_begin(&rig, PERMIT_ARMING);
@@ -279,8 +270,7 @@ TEST(test_permit_arming_ends_by_stop_and_disconnect_of_its_client) {
     iw_permit_disconnect(&rig.permit, rig.now_us, HOLDER);
     TEST_ASSERT_FALSE(iw_permit_arming(&rig.permit));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_ARMED, rig.permit.arm_refusal);
-    rig.view.proven = true;
-    permit_rig_step(&rig);
+    permit_rig_prove(&rig);
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_permit_state(&rig.permit));
 }
 
@@ -297,8 +287,7 @@ TEST(test_permit_arm_in_stopping_needs_zero_and_standstill) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, OTHER));
     rig.view.proven = true;
     permit_rig_wait(&rig, MS(3));
-    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_permit_state(&rig.permit));
-    TEST_ASSERT_EQUAL_INT(IW_DEMAND_FOLLOW, iw_permit_demand(&rig.permit));
+    permit_rig_assert(&rig, IW_STATE_ARMED, IW_DEMAND_FOLLOW);
     TEST_ASSERT_EQUAL_INT(OTHER, rig.permit.holder);
 }
 

@@ -142,8 +142,7 @@ TEST(test_permit_latched_while_listening_never_sends) {
     permit_rig_raise(&rig, IW_CAUSE_ESTOP_LINE);
     for (uint32_t n = 0; n < 20; n++) {
         permit_rig_wait(&rig, MS(700));
-        TEST_ASSERT_EQUAL_INT(IW_DEMAND_SILENCE, iw_permit_demand(&rig.permit));
-        TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, iw_permit_state(&rig.permit));
+        permit_rig_assert(&rig, IW_STATE_LATCHED, IW_DEMAND_SILENCE);
         TEST_ASSERT_TRUE(iw_permit_next_us(&rig.permit) == IW_NEVER);
     }
     TEST_ASSERT_EQUAL_UINT32(0, rig.permit.still_moving);
@@ -166,8 +165,7 @@ TEST(test_permit_stop_after_a_cut_one_ramps_again) {
     rig.view.at_rest = true;
     permit_rig_wait(&rig, MS(600));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
-    rig.view.proven = true;
-    permit_rig_step(&rig);
+    permit_rig_prove(&rig);
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_permit_state(&rig.permit));
     iw_permit_stop(&rig.permit, rig.now_us, HOLDER, IW_CAUSE_CLIENT_STOP);
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_BRAKE, iw_permit_demand(&rig.permit));

@@ -120,9 +120,7 @@ static permit_rig_t rig;
 
 static void arm_and_confirm(void) {
     (void)permit_rig_arm(&rig, HOLDER);
-    rig.view.proven = true;
-    permit_rig_step(&rig);
-    rig.view.proven = false;
+    permit_rig_prove(&rig);
     (void)permit_rig_drive(&rig, HOLDER, false);
 }
 

@@ -93,8 +93,7 @@ TEST(test_permit_hold_against_a_second_master_ends_after_10_s) {
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, iw_permit_demand(&rig.permit));
     permit_rig_raise(&rig, IW_CAUSE_SECOND_MASTER);
     permit_rig_step(&rig);
-    TEST_ASSERT_EQUAL_INT(IW_DEMAND_SILENCE, iw_permit_demand(&rig.permit));
-    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, iw_permit_state(&rig.permit));
+    permit_rig_assert(&rig, IW_STATE_LATCHED, IW_DEMAND_SILENCE);
 }
 
 TEST(test_permit_second_master_before_the_hold_does_not_count) {
@@ -102,8 +101,7 @@ TEST(test_permit_second_master_before_the_hold_does_not_count) {
     permit_rig_raise(&rig, IW_CAUSE_SECOND_MASTER);
     permit_rig_wait(&rig, MS(2000)); // The event of the second master has ended long ago.
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
-    rig.view.proven = true;
-    permit_rig_step(&rig);
+    permit_rig_prove(&rig);
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_permit_state(&rig.permit));
     rig.view.settled = false;
     iw_permit_stop(&rig.permit, rig.now_us, HOLDER, IW_CAUSE_CLIENT_STOP);
@@ -174,8 +172,7 @@ TEST(test_permit_reset_ends_the_latch_without_setpoints) {
     latch_and_calm(IW_CAUSE_INTERNAL);
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, iw_permit_demand(&rig.permit));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_reset(&rig));
-    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_permit_state(&rig.permit));
-    TEST_ASSERT_EQUAL_INT(IW_DEMAND_SILENCE, iw_permit_demand(&rig.permit));
+    permit_rig_assert(&rig, IW_STATE_LISTENING, IW_DEMAND_SILENCE);
     TEST_ASSERT_TRUE(iw_permit_next_us(&rig.permit) == IW_NEVER);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_ARMED, permit_rig_drive(&rig, HOLDER, true));
 }
@@ -285,8 +282,7 @@ TEST(test_permit_stop_after_a_reset_is_not_latched) {
     TEST_ASSERT_TRUE(rig.permit.stop.latched);
     (void)permit_rig_reset(&rig);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
-    rig.view.proven = true;
-    permit_rig_step(&rig);
+    permit_rig_prove(&rig);
     iw_permit_stop(&rig.permit, rig.now_us, HOLDER, IW_CAUSE_CLIENT_STOP);
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, iw_permit_state(&rig.permit));
     TEST_ASSERT_FALSE(rig.permit.stop.latched);
@@ -294,8 +290,7 @@ TEST(test_permit_stop_after_a_reset_is_not_latched) {
 
 TEST(test_permit_restarted_sends_zeros_before_listening) {
     permit_rig_init_restarted(&rig);
-    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, iw_permit_state(&rig.permit));
-    TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, iw_permit_demand(&rig.permit));
+    permit_rig_assert(&rig, IW_STATE_STOPPING, IW_DEMAND_ZERO);
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_RESTART, rig.permit.stop.cause);
     TEST_ASSERT_EQUAL_UINT32(1, rig.permit.stop.number);
     TEST_ASSERT_TRUE(rig.permit.stop.at_us == FIXTURE_START_US);
@@ -309,8 +304,7 @@ TEST(test_permit_restarted_without_any_wheel_ends_the_hold) {
     rig.view.settled = false;
     permit_rig_raise(&rig, IW_CAUSE_WHEEL_LOST);
     permit_rig_step(&rig);
-    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, iw_permit_state(&rig.permit));
-    TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, iw_permit_demand(&rig.permit));
+    permit_rig_assert(&rig, IW_STATE_STOPPING, IW_DEMAND_ZERO);
     TEST_ASSERT_TRUE(iw_permit_next_us(&rig.permit) == rig.now_us + MS(1500));
     assert_holding_until(MS(1500), IW_STATE_LISTENING);
     TEST_ASSERT_EQUAL_UINT32(0, rig.permit.still_moving); // It is unknown whether the wheels move.
@@ -328,12 +322,10 @@ TEST(test_permit_restarted_ends_zeros_at_the_5th_foreign_setpoint) {
         for (unsigned frame = 0; frame < 2; frame++) {
             receive_foreign(IW_SIDES_LEFT); // Frames that the dead process left in its controller.
             receive_foreign(IW_SIDES_RIGHT);
-            TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, iw_permit_state(&rig.permit));
-            TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, iw_permit_demand(&rig.permit));
+            permit_rig_assert(&rig, IW_STATE_STOPPING, IW_DEMAND_ZERO);
         }
         receive_foreign(sides[i]);
-        TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_permit_state(&rig.permit));
-        TEST_ASSERT_EQUAL_INT(IW_DEMAND_SILENCE, iw_permit_demand(&rig.permit));
+        permit_rig_assert(&rig, IW_STATE_LISTENING, IW_DEMAND_SILENCE);
     }
 }
 
@@ -342,8 +334,7 @@ TEST(test_permit_restarted_latches_on_estop) {
     for (size_t i = 0; i < 3; i++) {
         permit_rig_init_restarted(&rig);
         permit_rig_raise(&rig, causes[i]);
-        TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, iw_permit_state(&rig.permit));
-        TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, iw_permit_demand(&rig.permit));
+        permit_rig_assert(&rig, IW_STATE_LATCHED, IW_DEMAND_ZERO);
     }
 }
 
@@ -358,8 +349,7 @@ TEST(test_permit_restarted_arm_before_the_end_of_hold_is_refused) {
 static void assert_restarted_silent(void) {
     memset(&rig.permit, FIXTURE_POISON, sizeof rig.permit);
     iw_permit_init(&rig.permit, &rig.config, rig.now_us, true);
-    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_permit_state(&rig.permit));
-    TEST_ASSERT_EQUAL_INT(IW_DEMAND_SILENCE, iw_permit_demand(&rig.permit));
+    permit_rig_assert(&rig, IW_STATE_LISTENING, IW_DEMAND_SILENCE);
 }
 
 TEST(test_permit_restarted_without_permission_sends_nothing) {
@@ -381,8 +371,7 @@ TEST(test_permit_restarted_without_a_track_sends_zeros) {
         rig.config.hold = hold != 0;
         iw_permit_init(&rig.permit, &rig.config, rig.now_us, true);
         permit_rig_step(&rig);
-        TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, iw_permit_state(&rig.permit));
-        TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, iw_permit_demand(&rig.permit));
+        permit_rig_assert(&rig, IW_STATE_STOPPING, IW_DEMAND_ZERO);
         permit_rig_wait(&rig, MS(1600));
         TEST_ASSERT_EQUAL_INT((hold != 0) ? IW_STATE_STOPPING : IW_STATE_LISTENING, iw_permit_state(&rig.permit));
         TEST_ASSERT_EQUAL(hold != 0, iw_permit_demand(&rig.permit) != IW_DEMAND_SILENCE);

@@ -24,8 +24,7 @@ static void assert_held_for_a_day(iw_state_t state) {
 }
 
 static void assert_silent(iw_state_t state) {
-    TEST_ASSERT_EQUAL_INT(state, iw_permit_state(&rig.permit));
-    TEST_ASSERT_EQUAL_INT(IW_DEMAND_SILENCE, iw_permit_demand(&rig.permit));
+    permit_rig_assert(&rig, state, IW_DEMAND_SILENCE);
     TEST_ASSERT_FALSE(iw_permit_holding(&rig.permit));
 }
 
@@ -226,8 +225,7 @@ TEST(test_permit_keep_ends_by_arm_and_returns_if_arming_fails) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_SEND_STALLED, rig.permit.arm_refusal);
     assert_held_for_a_day(IW_STATE_STOPPING);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
-    rig.view.proven = true;
-    permit_rig_step(&rig);
+    permit_rig_prove(&rig);
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_permit_state(&rig.permit));
     TEST_ASSERT_FALSE(iw_permit_holding(&rig.permit));
 }

@@ -13,9 +13,7 @@ void setUp(void) {
 static void arm(void) {
     permit_rig_begin(&rig, PERMIT_LISTENING);
     (void)permit_rig_arm(&rig, HOLDER);
-    rig.view.proven = true;
-    permit_rig_step(&rig);
-    rig.view.proven = false;
+    permit_rig_prove(&rig);
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_permit_state(&rig.permit));
 }
 
@@ -230,8 +228,7 @@ TEST(test_permit_disconnect_of_the_holder_ends_the_lease) {
     arm();
     (void)permit_rig_drive(&rig, HOLDER, true);
     iw_permit_disconnect(&rig.permit, rig.now_us, HOLDER);
-    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, iw_permit_state(&rig.permit));
-    TEST_ASSERT_EQUAL_INT(IW_DEMAND_BRAKE, iw_permit_demand(&rig.permit));
+    permit_rig_assert(&rig, IW_STATE_STOPPING, IW_DEMAND_BRAKE);
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_CLIENT_GONE, rig.permit.stop.cause);
     TEST_ASSERT_EQUAL_UINT32(0, rig.permit.stop.detail);
     TEST_ASSERT_EQUAL_UINT8(IW_SIDES_NONE, rig.permit.stop.sides);
@@ -291,8 +288,7 @@ TEST(test_permit_stop_needs_no_lease_and_ramps) {
         rig.view.applied.wheel[IW_LEFT].speed_mm_s = 123;
         permit_rig_step(&rig);
         iw_permit_stop(&rig.permit, rig.now_us, OTHER, causes[i]);
-        TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, iw_permit_state(&rig.permit));
-        TEST_ASSERT_EQUAL_INT(IW_DEMAND_BRAKE, iw_permit_demand(&rig.permit));
+        permit_rig_assert(&rig, IW_STATE_STOPPING, IW_DEMAND_BRAKE);
         TEST_ASSERT_EQUAL_INT(causes[i], rig.permit.stop.cause);
         TEST_ASSERT_EQUAL_UINT32(0, rig.permit.stop.detail);
         TEST_ASSERT_EQUAL_UINT8(IW_SIDES_NONE, rig.permit.stop.sides);

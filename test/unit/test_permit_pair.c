@@ -26,9 +26,7 @@ static void arm_again(void) {
     rig.view.at_rest = true;
     permit_rig_wait(&rig, MS(600));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
-    rig.view.proven = true;
-    permit_rig_step(&rig);
-    rig.view.proven = false;
+    permit_rig_prove(&rig);
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_permit_state(&rig.permit));
     rig.view.output_zero = false;
 }
@@ -36,15 +34,13 @@ static void arm_again(void) {
 TEST(test_permit_diverging_pair_stops_without_a_latch) {
     permit_rig_begin(&rig, PERMIT_ARMED);
     raise(IW_CAUSE_PAIR_DIVERGES, IW_SIDES_LEFT, IW_REACT_RAMP);
-    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, iw_permit_state(&rig.permit));
-    TEST_ASSERT_EQUAL_INT(IW_DEMAND_BRAKE, demand());
+    permit_rig_assert(&rig, IW_STATE_STOPPING, IW_DEMAND_BRAKE);
     TEST_ASSERT_FALSE(rig.permit.stop.at_once);
     TEST_ASSERT_FALSE(rig.permit.stop.latched);
     TEST_ASSERT_EQUAL_UINT32(61, rig.permit.stop.detail);
     permit_rig_begin(&rig, PERMIT_ARMED);
     raise(IW_CAUSE_PAIR_DIVERGES, IW_SIDES_LEFT, IW_REACT_ZERO);
-    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, iw_permit_state(&rig.permit));
-    TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, demand());
+    permit_rig_assert(&rig, IW_STATE_STOPPING, IW_DEMAND_ZERO);
     TEST_ASSERT_TRUE(rig.permit.stop.at_once);
 }
 
@@ -119,8 +115,7 @@ TEST(test_permit_stops_of_other_causes_are_no_divergence) {
 TEST(test_permit_one_wheel_offline_latches_with_the_ramp) {
     permit_rig_begin(&rig, PERMIT_ARMED);
     raise(IW_CAUSE_WHEEL_LOST, IW_SIDES_LEFT, IW_REACT_RAMP);
-    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, iw_permit_state(&rig.permit));
-    TEST_ASSERT_EQUAL_INT(IW_DEMAND_BRAKE, demand());
+    permit_rig_assert(&rig, IW_STATE_LATCHED, IW_DEMAND_BRAKE);
     TEST_ASSERT_FALSE(rig.permit.stop.at_once);
     permit_rig_begin(&rig, PERMIT_ARMED);
     raise(IW_CAUSE_WHEEL_LOST, IW_SIDES_BOTH, IW_REACT_ZERO);
@@ -188,8 +183,7 @@ TEST(test_permit_hold_after_the_latched_ramp_begins_at_its_end) {
     permit_rig_wait(&rig, MS(rig.config.zero_hold_ms) - 1U);
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_BRAKE, demand());
     permit_rig_wait(&rig, 1U);
-    TEST_ASSERT_EQUAL_INT(IW_DEMAND_SILENCE, demand());
-    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, iw_permit_state(&rig.permit));
+    permit_rig_assert(&rig, IW_STATE_LATCHED, IW_DEMAND_SILENCE);
 }
 
 TEST(test_permit_hold_of_a_latch_without_ramp_begins_immediately) {
