@@ -1,44 +1,11 @@
 // SPDX-License-Identifier: MIT
 // Envelope and time: the permitted difference between a speed and the previous one.
-#include <string.h>
+#include "test_envelope_rig.h"
 
-#include "iwheel/private/transmit.h"
 #include "unit.h"
 
-#define START_US 5000000123ULL
-#define AGES_US  3600000000ULL
 /// A ramp in whole mm/s may be ahead of its slope by this value. The tests require a verdict outside this band only.
 #define ROUNDING_MM_S 1
-
-static iw_config_t config;
-static iw_envelope_t envelope;
-
-static void restart(void) {
-    config.min_current_mA = 300;
-    TEST_ASSERT_EQUAL_INT(IW_CONFIG_OK, iw_config_check(&config));
-    config.min_current_mA = 0; // These tests check speeds with a current of 0.
-    memset(&envelope, 0, sizeof envelope);
-    envelope.config = &config;
-}
-
-void setUp(void) {
-    iw_config_default(&config);
-    config.setpoint_type = 7;
-    config.setpoint_type_set = true;
-    config.current_role = IW_ROLE_LIMIT;
-    config.track_mm = 540;
-    restart();
-}
-
-static iw_envelope_verdict_t check(iw_time_us_t now_us, iw_side_t side, int32_t speed_mm_s, int32_t current_mA) {
-    const uint32_t speed = (uint32_t)speed_mm_s;
-    const uint32_t current = (uint32_t)current_mA;
-    const iw_can_frame_t frame = {.id = (side == IW_LEFT) ? 266U : 298U,
-                                  .dlc = 5,
-                                  .data = {7, (uint8_t)(speed >> 8 & 0xFFU), (uint8_t)(speed & 0xFFU),
-                                           (uint8_t)(current >> 8 & 0xFFU), (uint8_t)(current & 0xFFU)}};
-    return iw_envelope_check(&envelope, &frame, now_us);
-}
 
 /// Brings the wheel to a speed as fast as the slope permits.
 static void settle(iw_time_us_t now_us, iw_side_t side, int32_t speed_mm_s) {

@@ -48,8 +48,15 @@ static iw_bus_state_t bus(void) {
     return iwl_bus_state(&hal.bus);
 }
 
-static int receive(iw_can_frame_t *out_frame) {
-    return iwl_bus_receive(&hal.bus, out_frame);
+static iw_can_frame_t received; ///< Result of the last receive.
+
+static int receive(void) {
+    return iwl_bus_receive(&hal.bus, &received);
+}
+
+static void accept_hub(void) {
+    hub = accept(bus_listener, NULL, NULL);
+    TEST_ASSERT_TRUE(hub >= 0);
 }
 
 static void send_frame(uint32_t id, uint8_t dlc, uint8_t mark, uint8_t fill) {
@@ -72,8 +79,7 @@ void setUp(void) {
     bus_listener = listen_at(bus_name, SOCK_SEQPACKET);
     now_us = 1000000;
     TEST_ASSERT_EQUAL_INT(0, iwl_hal_open(&hal, bus_name, &(iwl_estop_config_t){.name = estop_name}, &cause));
-    hub = accept(bus_listener, NULL, NULL);
-    TEST_ASSERT_TRUE(hub >= 0);
+    accept_hub();
     TEST_ASSERT_EQUAL_INT(-1, estop());
     // Listen only now: otherwise the port would wait for the first byte of the button at start.
     estop_listener = listen_at(estop_name, SOCK_STREAM);
@@ -94,33 +100,31 @@ void tearDown(void) {
 TEST(test_local_frame_is_sent_unchanged_and_its_echo_has_the_mark) {
     const iw_can_frame_t frame = {.id = 266, .dlc = 5, .data = {1, 2, 3, 4, 5}};
     struct can_frame raw;
-    iw_can_frame_t received;
     TEST_ASSERT_TRUE(iwl_bus_send(&hal.bus, &frame, 1) > 0);
     TEST_ASSERT_EQUAL_INT((int)sizeof raw, (int)recv(hub, &raw, sizeof raw, 0));
     TEST_ASSERT_EQUAL_HEX32(266, raw.can_id);
     TEST_ASSERT_EQUAL_UINT8(5, raw.len);
     TEST_ASSERT_EQUAL_UINT8(0, raw.__res0);
     TEST_ASSERT_EQUAL_MEMORY(frame.data, raw.data, 8);
-    TEST_ASSERT_EQUAL_INT(0, receive(&received));
+    TEST_ASSERT_EQUAL_INT(0, receive());
     send_frame(266, 5, 1, 9);
     send_frame(266, 5, 0, 9);
     TEST_ASSERT_TRUE(wakes(iwl_hal_bus_fd(&hal)));
-    TEST_ASSERT_EQUAL_INT(1, receive(&received));
+    TEST_ASSERT_EQUAL_INT(1, receive());
     TEST_ASSERT_EQUAL_UINT8(IW_CAN_ECHO, received.kind);
-    TEST_ASSERT_EQUAL_INT(1, receive(&received));
+    TEST_ASSERT_EQUAL_INT(1, receive());
     TEST_ASSERT_EQUAL_UINT8(IW_CAN_RECEIVED, received.kind);
-    TEST_ASSERT_EQUAL_INT(0, receive(&received));
+    TEST_ASSERT_EQUAL_INT(0, receive());
     TEST_ASSERT_FALSE(wakes(iwl_hal_bus_fd(&hal)));
 }
 
 TEST(test_local_frames_of_several_batches_arrive_in_order) {
-    iw_can_frame_t received;
     unsigned expected = 0;
     for (unsigned i = 0; i < 100; i++) {
         send_frame(i, 8, 0, (uint8_t)i);
     }
     for (unsigned tries = 0; tries < 300 && expected < 100; tries++) {
-        if (receive(&received) > 0) {
+        if (receive() > 0) {
             TEST_ASSERT_EQUAL_HEX32(expected, received.id);
             expected++;
         }
@@ -129,66 +133,59 @@ TEST(test_local_frames_of_several_batches_arrive_in_order) {
 }
 
 TEST(test_local_frame_formats_differ) {
-    iw_can_frame_t received;
     send_frame(256U | CAN_RTR_FLAG, 4, 0, 0);
     send_frame(256U | CAN_EFF_FLAG, 4, 0, 0);
     send_frame(0x1ABCDEFU | CAN_EFF_FLAG | CAN_RTR_FLAG, 4, 0, 0);
-    TEST_ASSERT_EQUAL_INT(1, receive(&received));
+    TEST_ASSERT_EQUAL_INT(1, receive());
     TEST_ASSERT_EQUAL_HEX32(256U | IW_CAN_REMOTE, received.id);
-    TEST_ASSERT_EQUAL_INT(1, receive(&received));
+    TEST_ASSERT_EQUAL_INT(1, receive());
     TEST_ASSERT_EQUAL_HEX32(256U | IW_CAN_EXTENDED, received.id);
-    TEST_ASSERT_EQUAL_INT(1, receive(&received));
+    TEST_ASSERT_EQUAL_INT(1, receive());
     TEST_ASSERT_EQUAL_HEX32(0x1ABCDEFU | IW_CAN_EXTENDED | IW_CAN_REMOTE, received.id);
 }
 
 TEST(test_local_messages_of_another_size_are_ignored) {
-    iw_can_frame_t received;
     char junk[40] = {0};
     TEST_ASSERT_EQUAL_INT(15, (int)send(hub, junk, 15, 0));
     TEST_ASSERT_EQUAL_INT(17, (int)send(hub, junk, 17, 0));
     TEST_ASSERT_EQUAL_INT(40, (int)send(hub, junk, 40, 0));
     send_frame(257, 7, 0, 0);
-    TEST_ASSERT_EQUAL_INT(1, receive(&received));
+    TEST_ASSERT_EQUAL_INT(1, receive());
     TEST_ASSERT_EQUAL_HEX32(257, received.id);
-    TEST_ASSERT_EQUAL_INT(0, receive(&received));
+    TEST_ASSERT_EQUAL_INT(0, receive());
 }
 
 TEST(test_local_hub_lost_and_back_between_reads_is_reported_once) {
-    iw_can_frame_t received;
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, bus());
     send_frame(256, 4, 0, 0);
     (void)close(hub);
-    TEST_ASSERT_EQUAL_INT(1, receive(&received)); // A frame received before the end still counts.
-    TEST_ASSERT_TRUE(receive(&received) < 0);
+    TEST_ASSERT_EQUAL_INT(1, receive()); // A frame received before the end still counts.
+    TEST_ASSERT_TRUE(receive() < 0);
     iwl_hal_poll(&hal, now_us); // The port reconnects immediately.
-    hub = accept(bus_listener, NULL, NULL);
-    TEST_ASSERT_TRUE(hub >= 0);
+    accept_hub();
     TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, bus());
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, bus());
 }
 
 TEST(test_local_half_read_batch_is_dropped_when_the_hub_is_lost) {
     const iw_can_frame_t frame = {.id = 266, .dlc = 5};
-    iw_can_frame_t received;
     for (unsigned i = 0; i < 10; i++) {
         send_frame(256, 4, 0, 0);
     }
-    TEST_ASSERT_EQUAL_INT(1, receive(&received));
+    TEST_ASSERT_EQUAL_INT(1, receive());
     (void)close(hub);
     TEST_ASSERT_TRUE(iwl_bus_send(&hal.bus, &frame, 1) < 0);
     iwl_hal_poll(&hal, now_us); // The port reconnects immediately.
-    hub = accept(bus_listener, NULL, NULL);
-    TEST_ASSERT_TRUE(hub >= 0);
-    TEST_ASSERT_EQUAL_INT(0, receive(&received));
+    accept_hub();
+    TEST_ASSERT_EQUAL_INT(0, receive());
     TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, bus());
 }
 
 TEST(test_local_lost_hub_is_down_and_retried_at_the_back_off) {
-    iw_can_frame_t received;
     const iw_can_frame_t frame = {.id = 266, .dlc = 5};
     (void)close(bus_listener);
     (void)close(hub);
-    TEST_ASSERT_TRUE(receive(&received) < 0);
+    TEST_ASSERT_TRUE(receive() < 0);
     unsigned attempts = 0;
     for (unsigned i = 0; i < 1000; i++) { // One second, with a poll every millisecond.
         const iw_time_us_t before_us = iwl_hal_next_us(&hal);
@@ -198,7 +195,7 @@ TEST(test_local_lost_hub_is_down_and_retried_at_the_back_off) {
         TEST_ASSERT_TRUE(iwl_hal_next_us(&hal) <= now_us + 200000U);
         TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, bus());
         TEST_ASSERT_TRUE(iwl_bus_send(&hal.bus, &frame, 1) < 0);
-        TEST_ASSERT_TRUE(receive(&received) < 0);
+        TEST_ASSERT_TRUE(receive() < 0);
         now_us += 1000;
     }
     TEST_ASSERT_TRUE(attempts >= 5 && attempts <= 10);
@@ -206,55 +203,51 @@ TEST(test_local_lost_hub_is_down_and_retried_at_the_back_off) {
     bus_listener = listen_at(bus_name, SOCK_SEQPACKET);
     now_us += 200000;
     iwl_hal_poll(&hal, now_us);
-    hub = accept(bus_listener, NULL, NULL);
-    TEST_ASSERT_TRUE(hub >= 0);
+    accept_hub();
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, bus());
 }
 
 TEST(test_local_error_frames_change_only_the_state) {
-    iw_can_frame_t received;
     struct can_frame passive = {.can_id = CAN_ERR_FLAG | CAN_ERR_CRTL, .len = 8};
     passive.data[1] = CAN_ERR_CRTL_TX_PASSIVE;
     TEST_ASSERT_EQUAL_INT(16, (int)send(hub, &passive, sizeof passive, 0));
-    TEST_ASSERT_EQUAL_INT(0, receive(&received));
+    TEST_ASSERT_EQUAL_INT(0, receive());
     TEST_ASSERT_EQUAL_INT(IW_BUS_PASSIVE, bus());
     send_frame(CAN_ERR_FLAG | CAN_ERR_BUSOFF, 8, 0, 0);
     send_frame(CAN_ERR_FLAG | CAN_ERR_RESTARTED, 8, 0, 0);
-    TEST_ASSERT_EQUAL_INT(0, receive(&received));
+    TEST_ASSERT_EQUAL_INT(0, receive());
     TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, bus()); // A short bus-off is reported, too.
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, bus());
     send_frame(CAN_ERR_FLAG | CAN_ERR_BUSOFF, 8, 0, 0);
-    TEST_ASSERT_EQUAL_INT(0, receive(&received));
+    TEST_ASSERT_EQUAL_INT(0, receive());
     TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, bus());
     TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, bus());
 }
 
 TEST(test_local_state_frames_of_clients_cannot_end_bus_off) {
     static const uint32_t good[] = {CAN_ERR_FLAG | CAN_ERR_RESTARTED, CAN_ERR_FLAG | CAN_ERR_CRTL};
-    iw_can_frame_t received;
     send_frame(CAN_ERR_FLAG | CAN_ERR_BUSOFF, 8, 2, 0);
-    TEST_ASSERT_EQUAL_INT(0, receive(&received));
+    TEST_ASSERT_EQUAL_INT(0, receive());
     TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, bus());
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, bus());
     send_frame(CAN_ERR_FLAG | CAN_ERR_BUSOFF, 8, 0, 0);
-    TEST_ASSERT_EQUAL_INT(0, receive(&received));
+    TEST_ASSERT_EQUAL_INT(0, receive());
     for (size_t i = 0; i < 2; i++) {
         send_frame(good[i], 8, 2, CAN_ERR_CRTL_ACTIVE);
         send_frame(good[i], 8, 2, CAN_ERR_CRTL_TX_PASSIVE);
-        TEST_ASSERT_EQUAL_INT(0, receive(&received));
+        TEST_ASSERT_EQUAL_INT(0, receive());
         TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, bus());
     }
     send_frame(CAN_ERR_FLAG | CAN_ERR_CRTL, 8, 0,
                CAN_ERR_CRTL_ACTIVE); // The frame of the controller does not end bus-off either.
     send_frame(CAN_ERR_FLAG | CAN_ERR_CRTL, 8, 0, CAN_ERR_CRTL_TX_PASSIVE);
-    TEST_ASSERT_EQUAL_INT(0, receive(&received));
+    TEST_ASSERT_EQUAL_INT(0, receive());
     TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, bus());
 }
 
 TEST(test_local_restart_reports_a_missed_bus_off) {
-    iw_can_frame_t received;
     send_frame(CAN_ERR_FLAG | CAN_ERR_RESTARTED, 8, 0, 0);
-    TEST_ASSERT_EQUAL_INT(0, receive(&received));
+    TEST_ASSERT_EQUAL_INT(0, receive());
     TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, bus());
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, bus());
 }
@@ -275,7 +268,6 @@ TEST(test_local_full_hub_refuses_the_frame_and_stays_active) {
 TEST(test_local_purge_reconnects_to_the_hub_and_reports_a_loss) {
     const iw_can_frame_t frame = {.id = 266, .dlc = 5};
     struct can_frame raw;
-    iw_can_frame_t received;
     TEST_ASSERT_TRUE(iwl_bus_send(&hal.bus, &frame, 1) > 0);
     TEST_ASSERT_EQUAL_INT(IWL_LINK_PURGE_NONE, iwl_hal_link(&hal)->purge);
     TEST_ASSERT_EQUAL_INT(0, iwl_bus_purge(&hal.bus));
@@ -288,11 +280,10 @@ TEST(test_local_purge_reconnects_to_the_hub_and_reports_a_loss) {
     TEST_ASSERT_EQUAL_INT(0, (int)recv(hub, &raw, sizeof raw, 0));
     (void)close(hub);
     iwl_hal_poll(&hal, now_us);
-    hub = accept(bus_listener, NULL, NULL);
-    TEST_ASSERT_TRUE(hub >= 0);
+    accept_hub();
     TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, bus());
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, bus());
-    TEST_ASSERT_EQUAL_INT(0, receive(&received)); // No echo of an earlier frame arrives.
+    TEST_ASSERT_EQUAL_INT(0, receive()); // No echo of an earlier frame arrives.
     TEST_ASSERT_TRUE(iwl_bus_send(&hal.bus, &frame, 1) > 0);
 }
 
@@ -410,9 +401,8 @@ TEST(test_local_without_an_estop_is_released) {
 }
 
 static void lose_hub(void) {
-    iw_can_frame_t received;
     (void)close(hub);
-    TEST_ASSERT_TRUE(receive(&received) < 0);
+    TEST_ASSERT_TRUE(receive() < 0);
 }
 
 static void assert_waits_longer_and_longer(void) {
@@ -427,8 +417,7 @@ static void assert_waits_longer_and_longer(void) {
 static void come_back(void) {
     bus_listener = listen_at(bus_name, SOCK_SEQPACKET);
     iwl_bus_poll(&hal.bus, now_us);
-    hub = accept(bus_listener, NULL, NULL);
-    TEST_ASSERT_TRUE(hub >= 0);
+    accept_hub();
 }
 
 TEST(test_local_lost_hub_is_retried_with_growing_intervals) {
@@ -452,9 +441,8 @@ TEST(test_local_hub_absent_at_start_is_retried_after_20_ms) {
 }
 
 TEST(test_local_bus_off_lasts_until_a_new_hub) {
-    iw_can_frame_t received;
     send_frame(CAN_ERR_FLAG | CAN_ERR_BUSOFF, 8, 0, 0);
-    TEST_ASSERT_EQUAL_INT(0, receive(&received));
+    TEST_ASSERT_EQUAL_INT(0, receive());
     for (unsigned ms = 0; ms < 5U; ms++) {
         iwl_bus_poll(&hal.bus, now_us += 1000U);
         TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, bus());
@@ -482,8 +470,7 @@ TEST(test_local_without_descriptors_open_fails_and_poll_retries) {
     TEST_ASSERT_EQUAL_UINT64(now_us + 20000U, next_us);
     now_us = next_us;
     iwl_bus_poll(&hal.bus, now_us);
-    hub = accept(bus_listener, NULL, NULL);
-    TEST_ASSERT_TRUE(hub >= 0);
+    accept_hub();
 }
 
 TEST(test_local_bus_has_no_timing_and_a_proven_echo) {

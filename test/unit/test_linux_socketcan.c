@@ -56,24 +56,24 @@ static void set_down(void) {
     wait_ms(1);
 }
 
-static int receive(iw_can_frame_t *out_frame) {
-    return iwl_bus_receive(&store, out_frame);
+static iw_can_frame_t frame; ///< Result of the last receive.
+
+static int receive(void) {
+    return iwl_bus_receive(&store, &frame);
 }
 
 /// Reads all frames and returns their number.
 static unsigned drain(void) {
-    iw_can_frame_t frame;
     unsigned count = 0;
-    while (receive(&frame) > 0) {
+    while (receive() > 0) {
         count++;
     }
     return count;
 }
 
 static void assert_received_after_ms(unsigned ms, int expected) {
-    iw_can_frame_t frame;
     wait_ms(ms);
-    TEST_ASSERT_EQUAL_INT(expected, receive(&frame));
+    TEST_ASSERT_EQUAL_INT(expected, receive());
 }
 
 static int send_setpoint(void) {
@@ -185,12 +185,11 @@ TEST(test_socketcan_active_frame_ends_passive_but_not_bus_off) {
 }
 
 TEST(test_socketcan_frames_from_before_link_down_are_dropped) {
-    iw_can_frame_t frame;
     set_down();
     TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, state());
     fake_interface_put(&fake_interface.ours, 256, 4, 0);
     fake_interface_put(&fake_interface.others, 0x700, 4, 0);
-    TEST_ASSERT_TRUE(receive(&frame) < 0);
+    TEST_ASSERT_TRUE(receive() < 0);
     fake_interface.presence = IWL_LINK_UP;
     fake_interface.news = true;
     fake_interface_put(&fake_interface.ours, 288, 4, MSG_CONFIRM);
@@ -220,14 +219,13 @@ TEST(test_socketcan_frames_while_the_link_is_down_are_drained) {
 }
 
 TEST(test_socketcan_half_read_batch_is_dropped_at_link_down) {
-    iw_can_frame_t frame;
     for (unsigned i = 0; i < 20U; i++) {
         fake_interface_put(&fake_interface.ours, 256, 4, 0);
     }
     assert_received_after_ms(1, 1);
     fake_interface.send_result = -1;
     TEST_ASSERT_EQUAL_INT(-1, send_setpoint());
-    TEST_ASSERT_TRUE(receive(&frame) < 0);
+    TEST_ASSERT_TRUE(receive() < 0);
     fake_interface.send_result = 1;
     wait_ms(200);
     TEST_ASSERT_EQUAL_UINT(0, drain());
@@ -348,12 +346,11 @@ TEST(test_socketcan_down_at_start_is_reported_without_netlink) {
 }
 
 TEST(test_socketcan_interface_without_sockets_is_down) {
-    iw_can_frame_t frame;
     iwl_bus_close(&store);
     fake_interface.sockets_fail = true;
     TEST_ASSERT_EQUAL_INT(0, iwl_bus_open(&store, "can0"));
     assert_state_after_ms(1, IW_BUS_DOWN);
-    TEST_ASSERT_EQUAL_INT(-1, receive(&frame));
+    TEST_ASSERT_EQUAL_INT(-1, receive());
     TEST_ASSERT_EQUAL_INT(-1, send_setpoint());
     fake_interface.sockets_fail = false;
     assert_state_after_ms(200, IW_BUS_ACTIVE);
@@ -451,21 +448,20 @@ TEST(test_socketcan_lost_frames_are_counted_and_carrier_is_read) {
 }
 
 TEST(test_socketcan_other_ids_come_after_ours_and_setpoints) {
-    iw_can_frame_t frame;
     fake_interface_put(&fake_interface.others, 0x700, 4, 0);
     fake_interface_put(&fake_interface.ours, 256, 4, 0);
     wait_ms(20);
-    TEST_ASSERT_EQUAL_INT(1, receive(&frame));
+    TEST_ASSERT_EQUAL_INT(1, receive());
     TEST_ASSERT_EQUAL_HEX32(256, frame.id);
-    TEST_ASSERT_EQUAL_INT(1, receive(&frame));
+    TEST_ASSERT_EQUAL_INT(1, receive());
     TEST_ASSERT_EQUAL_HEX32(0x700, frame.id);
-    TEST_ASSERT_EQUAL_INT(0, receive(&frame));
+    TEST_ASSERT_EQUAL_INT(0, receive());
     fake_interface_put(&fake_interface.others, 0x701, 4, 0);
     assert_received_after_ms(1, 0);
     TEST_ASSERT_EQUAL_INT(1, send_setpoint());
     assert_received_after_ms(2, 0);
     wait_ms(1);
-    TEST_ASSERT_EQUAL_INT(1, receive(&frame));
+    TEST_ASSERT_EQUAL_INT(1, receive());
     TEST_ASSERT_EQUAL_HEX32(0x701, frame.id);
     assert_received_after_ms(20, 0);
     fake_interface_put(&fake_interface.others, 0x702, 4, 0);
@@ -474,13 +470,12 @@ TEST(test_socketcan_other_ids_come_after_ours_and_setpoints) {
 }
 
 TEST(test_socketcan_echo_has_the_mark_of_the_message) {
-    iw_can_frame_t frame;
     fake_interface_put(&fake_interface.ours, 266, 5, MSG_CONFIRM | MSG_DONTROUTE);
     fake_interface_put(&fake_interface.ours, 266, 5, MSG_DONTROUTE);
     wait_ms(1);
-    TEST_ASSERT_EQUAL_INT(1, receive(&frame));
+    TEST_ASSERT_EQUAL_INT(1, receive());
     TEST_ASSERT_EQUAL_UINT8(IW_CAN_ECHO, frame.kind);
-    TEST_ASSERT_EQUAL_INT(1, receive(&frame));
+    TEST_ASSERT_EQUAL_INT(1, receive());
     TEST_ASSERT_EQUAL_UINT8(IW_CAN_RECEIVED, frame.kind);
 }
 
