@@ -2,6 +2,7 @@
 // Configuration file of the gateway: which texts are accepted or refused, and the messages of a refusal.
 #include "test_config_rig.h"
 
+#include "folder.h"
 #include "unit.h"
 
 #include <stdlib.h>
@@ -439,15 +440,9 @@ TEST(test_print_fits_the_line_limit_with_the_longest_texts) {
 }
 
 TEST(test_print_of_defaults_equals_the_shipped_file) {
-    static char shipped[32768];
-    FILE *file = fopen(IWHEEL_SHARE_DIR "/gateway.conf", "r");
-    TEST_ASSERT_NOT_NULL_MESSAGE(file, IWHEEL_SHARE_DIR "/gateway.conf is missing");
-    const size_t size = fread(shipped, 1, sizeof shipped - 1U, file);
-    fclose(file);
-    shipped[size] = '\0';
     gateway_config_default(&config);
     char *text = printed(&config);
-    TEST_ASSERT_EQUAL_STRING_MESSAGE(text, shipped,
+    TEST_ASSERT_EQUAL_STRING_MESSAGE(text, file_text(IWHEEL_SHARE_DIR "/gateway.conf"),
                                      "copy the output of iwheel-gateway --print-config to share/gateway.conf");
     free(text);
 }

@@ -33,7 +33,7 @@ int nanosleep(const struct timespec *pause, struct timespec *left) {
 }
 
 int fsync(int fd) {
-    while (fsync_waits && access(in_folder("flush"), F_OK) != 0) {
+    while (fsync_waits && !file_exists(in_folder("flush"))) {
         (void)poll(NULL, 0, 1);
     }
     if (fsync_error != 0) {
@@ -74,10 +74,7 @@ static void name_again(const char *name, const char *again) {
 }
 
 static void put_file(const char *name, const char *content) {
-    FILE *file = fopen(in_folder(name), "w");
-    TEST_ASSERT_NOT_NULL(file);
-    (void)fputs(content, file);
-    (void)fclose(file);
+    file_put(in_folder(name), content, strlen(content));
 }
 
 /// Writes the text and waits for the result.
@@ -87,12 +84,7 @@ static void write_text(const char *text, gw_file_store_news_t expected) {
 }
 
 static void assert_file(const char *name, const char *content) {
-    char found[64] = "";
-    FILE *file = fopen(in_folder(name), "r");
-    TEST_ASSERT_NOT_NULL_MESSAGE(file, name);
-    (void)!fread(found, 1, sizeof found - 1U, file);
-    (void)fclose(file);
-    TEST_ASSERT_EQUAL_STRING(content, found);
+    TEST_ASSERT_EQUAL_STRING(content, file_text(in_folder(name)));
 }
 
 TEST(test_file_store_writes_reads_back_and_sets_aside) {
@@ -109,7 +101,7 @@ TEST(test_file_store_writes_reads_back_and_sets_aside) {
     write_text("two", GW_FILE_STORE_WRITTEN);
     assert_file("file.damaged", "one");
     assert_file("file", "two");
-    TEST_ASSERT_EQUAL_INT(-1, access(in_folder("file.new"), F_OK));
+    TEST_ASSERT_FALSE(file_exists(in_folder("file.new")));
     gw_file_store_close(&store);
 }
 
@@ -169,7 +161,7 @@ TEST(test_file_store_reports_failed_fsync_and_rename) {
     TEST_ASSERT_EQUAL_INT(0, mkdir(in_folder("file"), 0700));
     write_text("new", GW_FILE_STORE_FAILED);
     TEST_ASSERT_EQUAL_INT(EISDIR, error);
-    TEST_ASSERT_EQUAL_INT(-1, access(in_folder("file.new"), F_OK));
+    TEST_ASSERT_FALSE(file_exists(in_folder("file.new")));
     gw_file_store_close(&store);
 }
 
@@ -194,7 +186,7 @@ TEST(test_file_store_read_waits_for_a_pending_write) {
     open_store(folder, GW_FILE_STORE_READ);
     fsync_waits = false;
     TEST_ASSERT_TRUE(gw_file_store_write(&store, "new", 3));
-    for (unsigned ms = 0; ms < 5000U && access(in_folder("file.new"), F_OK) != 0; ms++) {
+    for (unsigned ms = 0; ms < 5000U && !file_exists(in_folder("file.new")); ms++) {
         (void)poll(NULL, 0, 1);
     }
     gw_file_store_close(&store);

@@ -9,7 +9,6 @@
 #include "box_end.h"
 #include "folder.h"
 #include "unit.h"
-#include <dirent.h>
 #include <errno.h>
 #include <poll.h>
 #include <signal.h>
@@ -128,54 +127,44 @@ static void record_harmless(const char *cause) {
     TEST_ASSERT_EQUAL(GW_CHILD_MESSAGE, wait_news());
 }
 
-static bool is_there(const char *name) {
-    char path[256];
+static char *in_records(const char *name) {
+    static char path[256];
     (void)snprintf(path, sizeof path, "%s/%s", config.record.directory, name);
-    return access(path, F_OK) == 0;
+    return path;
+}
+
+static bool is_there(const char *name) {
+    return file_exists(in_records(name));
 }
 
 static unsigned count_files(void) {
-    unsigned files = 0;
-    DIR *list = opendir(config.record.directory);
-    TEST_ASSERT_NOT_NULL(list);
-    for (const struct dirent *entry = readdir(list); entry != NULL; entry = readdir(list)) {
-        files += (strncmp(entry->d_name, "stop-", 5) == 0) ? 1U : 0U;
-    }
-    (void)closedir(list);
-    return files;
+    return files_in(config.record.directory, "stop-");
 }
 
-static void read_file(const char *name, char *out, size_t size) {
-    char path[256];
-    (void)snprintf(path, sizeof path, "%s/%s", config.record.directory, name);
-    FILE *file = fopen(path, "r");
-    TEST_ASSERT_NOT_NULL_MESSAGE(file, path);
-    out[fread(out, 1, size - 1U, file)] = '\0';
-    (void)fclose(file);
+static const char *read_file(const char *name) {
+    return file_text(in_records(name));
 }
 
 TEST(test_recording_has_frames_events_and_configuration) {
-    char text[8192];
     start();
     record("estop_line", 0);
     TEST_ASSERT_EQUAL(10, box.last.frames);
     TEST_ASSERT_NOT_NULL(strstr(box.last.path, "/records/stop-000001-estop_line.log"));
     TEST_ASSERT_EQUAL(3, count_files());
-    read_file("stop-000001-estop_line.log", text, sizeof text);
+    const char *text = read_file("stop-000001-estop_line.log");
     TEST_ASSERT_NOT_NULL(strstr(text, ") can0 100#00000000 R\n"));
     TEST_ASSERT_NOT_NULL(strstr(text, ") can0 100#00090000 R\n"));
-    read_file("stop-000001-estop_line.jsonl", text, sizeof text);
+    text = read_file("stop-000001-estop_line.jsonl");
     TEST_ASSERT_NOT_NULL(strstr(text, "{\"type\":\"blackbox\",\"format\":1,"));
     TEST_ASSERT_NOT_NULL(strstr(text, "\"sentence\":\"because of \\\"this\\\"\""));
     TEST_ASSERT_NOT_NULL(strstr(text, "{\"type\":\"step\",\"frames\":10,"));
     TEST_ASSERT_NOT_NULL(strstr(text, "{\"type\":\"end\",\"frames\":10}\n"));
     TEST_ASSERT_NULL(strstr(text, "lost"));
-    read_file("stop-000001-estop_line.conf", text, sizeof text);
+    text = read_file("stop-000001-estop_line.conf");
     TEST_ASSERT_EQUAL_STRING(CONFIG, text);
 }
 
 TEST(test_recording_has_wall_clock_times) {
-    char text[8192];
     char line[64];
     start();
     const gw_box_order_t order = stopped("estop_line");
@@ -183,21 +172,20 @@ TEST(test_recording_has_wall_clock_times) {
     const uint64_t first_us = order.note.stop.at_us - 1000U + (uint64_t)order.wall_minus_us;
     (void)snprintf(line, sizeof line, "(%llu.%06llu) can0 100#00000000 R\n", (unsigned long long)first_us / 1000000U,
                    (unsigned long long)first_us % 1000000U);
-    read_file("stop-000001-estop_line.log", text, sizeof text);
+    const char *text = read_file("stop-000001-estop_line.log");
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, line), text);
 }
 
 TEST(test_recording_is_on_the_disk_to_its_last_byte) {
     static const char *const names[] = {"stop-000001-estop_line.log", "stop-000001-estop_line.jsonl",
                                         "stop-000001-estop_line.conf"};
-    char text[8192];
     off_t bytes = 0;
     synced = mmap(NULL, sizeof *synced, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
     TEST_ASSERT_TRUE(synced != MAP_FAILED);
     start();
     record("estop_line", 0);
     for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
-        read_file(names[i], text, sizeof text);
+        const char *text = read_file(names[i]);
         bytes += (off_t)strlen(text);
     }
     TEST_ASSERT_EQUAL_INT(bytes, *synced);
@@ -206,7 +194,6 @@ TEST(test_recording_is_on_the_disk_to_its_last_byte) {
 }
 
 TEST(test_recording_contains_entries_after_the_stop) {
-    char text[8192];
     start();
     const gw_box_order_t order = stopped("estop_line");
     const blackbox_entry_t frame = {
@@ -222,7 +209,7 @@ TEST(test_recording_contains_entries_after_the_stop) {
     TEST_ASSERT_TRUE(gw_box_write(&box, &order));
     TEST_ASSERT_EQUAL(GW_CHILD_MESSAGE, wait_news());
     TEST_ASSERT_EQUAL(11, box.last.frames);
-    read_file("stop-000001-estop_line.jsonl", text, sizeof text);
+    const char *text = read_file("stop-000001-estop_line.jsonl");
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "\"bus\":\"can0\""), text);
     const char *line = strstr(text, "{\"type\":\"state\"");
     TEST_ASSERT_NOT_NULL_MESSAGE(line, text);
@@ -240,34 +227,26 @@ TEST(test_recording_excludes_entries_older_than_blackbox_s) {
 }
 
 TEST(test_recording_of_an_overwritten_ring_is_not_from_start) {
-    static char text[8192];
     start();
     record("estop_line", 0);
-    read_file("stop-000001-estop_line.jsonl", text, sizeof text);
+    const char *text = read_file("stop-000001-estop_line.jsonl");
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "\"from_start\":true"), text);
     for (iw_time_us_t at_us = iwl_clock_now_us() - GW_BOX_AFTER_US - 1000000U; blackbox_ring_is_whole(box.ring);) {
         const blackbox_entry_t step = {.at_us = at_us, .kind = BLACKBOX_STEP};
         blackbox_ring_put(box.ring, &step);
     }
     record("estop_line", 0);
-    read_file("stop-000002-estop_line.jsonl", text, sizeof text);
+    text = read_file("stop-000002-estop_line.jsonl");
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "\"from_start\":false"), text);
 }
 
 /// The standard streams and its end of the socket.
 TEST(test_writer_has_no_open_file_after_a_recording) {
     char path[64];
-    unsigned count = 0;
     start();
     record("estop_line", 0);
     (void)snprintf(path, sizeof path, "/proc/%d/fd", (int)box.writer.pid);
-    DIR *list = opendir(path);
-    TEST_ASSERT_NOT_NULL(list);
-    for (const struct dirent *entry = readdir(list); entry != NULL; entry = readdir(list)) {
-        count += (entry->d_name[0] != '.') ? 1U : 0U;
-    }
-    (void)closedir(list);
-    TEST_ASSERT_EQUAL_UINT(4U, count);
+    TEST_ASSERT_EQUAL_UINT(4U, files_in(path, ""));
 }
 
 TEST(test_recording_number_continues_after_a_restart) {
@@ -280,18 +259,14 @@ TEST(test_recording_number_continues_after_a_restart) {
 }
 
 TEST(test_many_stops_retain_the_newest_and_other_files) {
-    char path[192];
     start();
     record("estop_line", 0);
-    (void)snprintf(path, sizeof path, "%s/stop-me.txt", config.record.directory);
-    FILE *mine = fopen(path, "w");
-    TEST_ASSERT_NOT_NULL(mine);
-    (void)fclose(mine);
+    file_put(in_records("stop-me.txt"), "", 0);
     for (unsigned i = 0; i < config.record.keep_stops + 2U; i++) {
         record("estop_line", 0);
     }
     TEST_ASSERT_EQUAL(3U * config.record.keep_stops + 1U, count_files());
-    TEST_ASSERT_EQUAL(0, access(path, F_OK));
+    TEST_ASSERT_TRUE(is_there("stop-me.txt"));
     TEST_ASSERT_FALSE(is_there("stop-000003-estop_line.log"));
     TEST_ASSERT_TRUE(is_there("stop-000004-estop_line.log"));
 }
@@ -316,7 +291,6 @@ TEST(test_harmless_stops_do_not_replace_recordings_of_motion) {
 }
 
 TEST(test_recording_of_an_uncommanded_turning_wheel_is_motion) {
-    char text[8192];
     start();
     gw_box_order_t order = stopped("estop_line");
     const blackbox_entry_t turning = {.at_us = order.note.stop.at_us - 1U,
@@ -327,7 +301,7 @@ TEST(test_recording_of_an_uncommanded_turning_wheel_is_motion) {
     blackbox_ring_put(box.ring, &turning);
     order.mark = blackbox_ring_written(box.ring);
     record_order(&order, 0);
-    read_file("stop-000001-estop_line.jsonl", text, sizeof text);
+    const char *text = read_file("stop-000001-estop_line.jsonl");
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "\"in_motion\":true"), text);
     TEST_ASSERT_FALSE(gw_box_line_is_harmless(text));
 }
@@ -360,9 +334,7 @@ static bool mount_small_disk(void) {
 /// Fills the disk to its last byte, as any local user can do.
 static void fill_disk(const char *name) {
     static const char block[4096];
-    char path[256];
-    (void)snprintf(path, sizeof path, "%s/%s", config.record.directory, name);
-    FILE *file = fopen(path, "w");
+    FILE *file = fopen(in_records(name), "w");
     TEST_ASSERT_NOT_NULL(file);
     while (fwrite(block, 1, sizeof block, file) == sizeof block && fflush(file) == 0) {
     }
@@ -500,7 +472,6 @@ TEST(test_killed_writer_is_detected_and_started_again) {
 }
 
 TEST(test_kill_of_the_gateway_is_recorded_only_while_sending) {
-    char text[8192];
     for (int sending = 0; sending < 2; sending++) {
         start();
         (void)stopped("");
@@ -518,13 +489,12 @@ TEST(test_kill_of_the_gateway_is_recorded_only_while_sending) {
         open_box = false;
     }
     TEST_ASSERT_EQUAL(3, count_files());
-    read_file("stop-000001-gateway_died.jsonl", text, sizeof text);
+    const char *text = read_file("stop-000001-gateway_died.jsonl");
     TEST_ASSERT_NOT_NULL(strstr(text, "the last ones left 300 mm/s and right 0 mm/s"));
 }
 
 /// Recording of a rolling machine: it is no stop, so `box.stop` still refers to the last stop.
 TEST(test_rolling_is_recorded_and_is_no_stop) {
-    static char text[16384];
     static const iw_codec_wheel_t line;
     iw_snapshot_t seen = {.state = IW_STATE_LISTENING, .at_us = iwl_clock_now_us() - GW_BOX_AFTER_US};
     sock_log_t log;
@@ -539,7 +509,7 @@ TEST(test_rolling_is_recorded_and_is_no_stop) {
     TEST_ASSERT_EQUAL(0, box.last.error);
     TEST_ASSERT_EQUAL(3, box.stop.number);
     TEST_ASSERT_TRUE(is_there("stop-000002-rolling.log") && is_there("stop-000002-rolling.conf"));
-    read_file("stop-000002-rolling.jsonl", text, sizeof text);
+    const char *text = read_file("stop-000002-rolling.jsonl");
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "\"cause\":\"rolling\",\"side\":\"right\","), text);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "use its parking brake"), text);
     sock_log_close(&log);

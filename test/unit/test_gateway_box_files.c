@@ -5,11 +5,9 @@
 #include "folder.h"
 #include "unit.h"
 
-#include <dirent.h>
 #include <fcntl.h>
 #include <signal.h>
 #include <stdio.h>
-#include <string.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -28,18 +26,11 @@ void tearDown(void) {
 static bool is_there(const char *name) {
     char path[256];
     (void)snprintf(path, sizeof path, "%s/%s", records, name);
-    return access(path, F_OK) == 0;
+    return file_exists(path);
 }
 
 static unsigned count_files(void) {
-    unsigned files = 0;
-    DIR *list = opendir(records);
-    TEST_ASSERT_NOT_NULL(list);
-    for (const struct dirent *entry = readdir(list); entry != NULL; entry = readdir(list)) {
-        files += (strncmp(entry->d_name, "stop-", 5) == 0) ? 1U : 0U;
-    }
-    (void)closedir(list);
-    return files;
+    return files_in(records, "stop-");
 }
 
 /// Writes the recordings `first` to `last` of a stop with this speed, without the writer process.

@@ -18,10 +18,7 @@ void setUp(void) {
     folder_make();
     (void)snprintf(path, sizeof path, "%s/can0.restart", folder);
     (void)snprintf(victim, sizeof victim, "%s/victim", folder);
-    FILE *file = fopen(victim, "w");
-    TEST_ASSERT_NOT_NULL(file);
-    (void)fputs("untouched", file);
-    (void)fclose(file);
+    file_put(victim, "untouched", strlen("untouched"));
 }
 
 void tearDown(void) {
@@ -29,12 +26,7 @@ void tearDown(void) {
 }
 
 static void expect_untouched(void) {
-    char text[32] = "";
-    FILE *file = fopen(victim, "r");
-    TEST_ASSERT_NOT_NULL(file);
-    TEST_ASSERT_NOT_NULL(fgets(text, sizeof text, file));
-    (void)fclose(file);
-    TEST_ASSERT_EQUAL_STRING("untouched", text);
+    TEST_ASSERT_EQUAL_STRING("untouched", file_text(victim));
 }
 
 /// Counts events as a unit with PathChanged= receives them: a file was closed after writing.

@@ -84,21 +84,18 @@ static void stop(uint32_t number) {
     TEST_ASSERT_EQUAL_INT(0, box.stop.error);
 }
 
-static const char *read_file(const char *name) {
-    static char text[65536];
-    char path[192];
+static char *in_records(const char *name) {
+    static char path[192];
     (void)snprintf(path, sizeof path, "%s/%s", records, name);
-    FILE *file = fopen(path, "r");
-    TEST_ASSERT_NOT_NULL_MESSAGE(file, path);
-    text[fread(text, 1, sizeof text - 1U, file)] = '\0';
-    (void)fclose(file);
-    return text;
+    return path;
+}
+
+static const char *read_file(const char *name) {
+    return file_text(in_records(name));
 }
 
 static bool is_there(const char *name) {
-    char path[192];
-    (void)snprintf(path, sizeof path, "%s/%s", records, name);
-    return access(path, F_OK) == 0;
+    return file_exists(in_records(name));
 }
 
 static void assert_has(const char *text, const char *part) {

@@ -48,10 +48,6 @@ static void assert_said_pid(pid_t pid) {
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(logged, text), logged);
 }
 
-static bool exists(const char *path) {
-    return access(path, F_OK) == 0;
-}
-
 /// Returns the name of an interface that no other run of this test uses.
 static const char *interface(void) {
     static char name[16];
@@ -128,8 +124,8 @@ TEST(test_lock_second_gateway_on_local_bus_is_refused) {
     assert_said_pid(getpid());
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(logged, bus + 5), logged);
     TEST_ASSERT_TRUE(gw_runtime_mark(&first, true));
-    TEST_ASSERT_TRUE(exists(in_folder("bus.armed")));
-    TEST_ASSERT_FALSE(exists(shared));
+    TEST_ASSERT_TRUE(file_exists(in_folder("bus.armed")));
+    TEST_ASSERT_FALSE(file_exists(shared));
 }
 
 static void crash_while_sending(const gateway_config_t *config) {
@@ -153,14 +149,12 @@ TEST(test_marker_makes_the_shared_directory_again_that_was_removed) {
     TEST_ASSERT_EQUAL_INT(0, open_runtime(&first, &one));
     TEST_ASSERT_EQUAL_INT(0, rename(shared, in_folder("removed")));
     TEST_ASSERT_TRUE(gw_runtime_mark(&first, true));
-    TEST_ASSERT_TRUE(exists(first.place[0]));
+    TEST_ASSERT_TRUE(file_exists(first.place[0]));
     TEST_ASSERT_EQUAL_STRING(first.place[0], first.marker_path);
 }
 
 TEST(test_marker_without_shared_directory_is_next_to_the_socket) {
-    FILE *in_the_way = fopen(shared, "w"); // This also prevents root.
-    TEST_ASSERT_NOT_NULL(in_the_way);
-    (void)fclose(in_the_way);
+    file_put(shared, "", 0); // This also prevents root.
     crash_while_sending(&one);
     TEST_ASSERT_TRUE(strncmp(first.marker_path, in_folder("one"), strlen(in_folder("one"))) == 0);
     TEST_ASSERT_EQUAL_INT(0, open_runtime(&first, &one));
@@ -190,9 +184,9 @@ TEST(test_marker_removed_in_one_place_only_is_set_again) {
     TEST_ASSERT_TRUE(gw_runtime_mark(&first, true));
     TEST_ASSERT_EQUAL_INT(0, mkdir(first.place[1], 0755));
     TEST_ASSERT_FALSE(gw_runtime_mark(&first, false));
-    TEST_ASSERT_FALSE(exists(first.place[0]));
+    TEST_ASSERT_FALSE(file_exists(first.place[0]));
     TEST_ASSERT_TRUE(gw_runtime_mark(&first, true));
-    TEST_ASSERT_TRUE(exists(first.place[0]));
+    TEST_ASSERT_TRUE(file_exists(first.place[0]));
     TEST_ASSERT_EQUAL_INT(0, rmdir(first.place[1]));
     TEST_ASSERT_TRUE(gw_runtime_mark(&first, false));
 }
@@ -297,9 +291,7 @@ TEST(test_lock_with_every_name_held_excludes_by_its_file) {
 
 /// Neither the file nor the directory can be created, not even by root.
 static void spoil_shared(void) {
-    FILE *in_the_way = fopen(shared, "w");
-    TEST_ASSERT_NOT_NULL(in_the_way);
-    (void)fclose(in_the_way);
+    file_put(shared, "", 0);
 }
 
 TEST(test_lock_without_its_file_excludes_by_the_next_name) {

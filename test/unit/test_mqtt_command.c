@@ -4,6 +4,7 @@
 #include "mqtt_command.h"
 #include "mqtt_contents.h"
 
+#include "folder.h"
 #include "unit.h"
 
 #include <stdio.h>
@@ -423,18 +424,13 @@ TEST(test_settings_that_are_unsafe_are_refused) {
 }
 
 TEST(test_settings_shipped_are_the_defaults) {
-    char shipped[16384];
     char *printed = NULL;
     size_t length = 0;
     mqtt_settings_t settings;
-    FILE *file = fopen(IWHEEL_SHARE_DIR "/mqtt.conf", "r");
-    TEST_ASSERT_NOT_NULL(file);
-    shipped[fread(shipped, 1, sizeof shipped - 1U, file)] = '\0';
-    (void)fclose(file);
     settings = mqtt_settings_standard;
     FILE *out = open_memstream(&printed, &length);
     settings_print(&mqtt_settings_form, &settings, &settings, NULL, out);
     (void)fclose(out);
-    TEST_ASSERT_EQUAL_STRING(printed, shipped);
+    TEST_ASSERT_EQUAL_STRING(printed, file_text(IWHEEL_SHARE_DIR "/mqtt.conf"));
     free(printed);
 }

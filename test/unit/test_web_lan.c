@@ -96,10 +96,7 @@ TEST(test_lan_key_that_cannot_be_replaced_is_named_with_its_fix) {
 
 TEST(test_lan_bad_certificate_is_replaced_with_a_message) {
     TEST_ASSERT_EQUAL_INT(0, prepare());
-    FILE *file = fopen(in_folder("lan-certificate.pem"), "we");
-    TEST_ASSERT_NOT_NULL(file);
-    TEST_ASSERT_TRUE(fputs("no certificate", file) >= 0);
-    TEST_ASSERT_EQUAL_INT(0, fclose(file));
+    file_put(in_folder("lan-certificate.pem"), "no certificate", strlen("no certificate"));
     reset_settings();
     TEST_ASSERT_EQUAL_INT(0, prepare());
     assert_printed("/lan-certificate.pem: ");

@@ -17,20 +17,13 @@ static char path[64];
 static char packed_path[64];
 static page_file_t file;
 
-static void write_file(const char *name, const void *bytes, size_t length) {
-    FILE *out = fopen(name, "we");
-    TEST_ASSERT_NOT_NULL(out);
-    TEST_ASSERT_EQUAL_size_t(length, fwrite(bytes, 1, length, out));
-    TEST_ASSERT_EQUAL_INT(0, fclose(out));
-}
-
 void setUp(void) {
     memset(&file, 0, sizeof file);
     folder_make();
     (void)snprintf(path, sizeof path, "%s/page.js", folder);
     (void)snprintf(packed_path, sizeof packed_path, "%s/page.js.gz", folder);
-    write_file(path, hello, sizeof hello - 1U);
-    write_file(packed_path, packed, sizeof packed);
+    file_put(path, hello, sizeof hello - 1U);
+    file_put(packed_path, packed, sizeof packed);
 }
 
 void tearDown(void) {
@@ -58,12 +51,12 @@ TEST(test_page_file_packed_form_of_other_bytes_is_ignored) {
         static const size_t at[] = {0, 1, 18, 19, 20, 21, 22, 23, 24, 25};
         memcpy(other, packed, sizeof packed);
         other[at[i]] ^= 1U;
-        write_file(packed_path, other, sizeof other);
+        file_put(packed_path, other, sizeof other);
         TEST_ASSERT_TRUE(page_file_read(&file, path));
         TEST_ASSERT_NULL(file.packed.text);
         page_file_free(&file);
     }
-    write_file(packed_path, packed, 8);
+    file_put(packed_path, packed, 8);
     TEST_ASSERT_TRUE(page_file_read(&file, path));
     TEST_ASSERT_NULL(file.packed.text);
     page_file_free(&file);
