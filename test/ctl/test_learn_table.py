@@ -200,8 +200,11 @@ class Lacks(unittest.TestCase):
         self.assertEqual(expected, {key: verdict for key, verdict in found.items() if key in expected})
         return found
 
+    def of(self, side, *items, verdict=OPEN):
+        return {f"{item} {side}": verdict for item in items}
+
     def both(self, *items, verdict=OPEN):
-        return {f"{item} {side}": verdict for item in items for side in SIDES}
+        return self.of("left", *items, verdict=verdict) | self.of("right", *items, verdict=verdict)
 
     def test_learn_whole_recording_has_all_findings(self):
         found = self.differs({})
@@ -216,15 +219,7 @@ class Lacks(unittest.TestCase):
 
     def test_learn_telemetry_of_one_wheel_leaves_what_both_do_open(self):
         self.differs(
-            {
-                "setpoint_type": OPEN,
-                "current_role": OPEN,
-                "feedback_sign right": OPEN,
-                "speed_scale right": OPEN,
-                "ticks_per_turn right": OPEN,
-                "force_unit right": OPEN,
-                "pair": OPEN,
-            },
+            {"setpoint_type": OPEN, "current_role": OPEN, "pair": OPEN, **self.of("right", "feedback_sign", "speed_scale", "ticks_per_turn", "force_unit")},
             speeds=(True, False),
         )
 
@@ -233,10 +228,8 @@ class Lacks(unittest.TestCase):
             {
                 "setpoint_type": (AGAINST, None),
                 "current_role": OPEN,
-                "feedback_sign left": OPEN,
-                "speed_scale left": OPEN,
-                "ticks_per_turn left": OPEN,
                 "pair": (AGAINST, None),
+                **self.of("left", "feedback_sign", "speed_scale", "ticks_per_turn"),
             },
             turns=(False, True),
         )
