@@ -113,14 +113,14 @@ def latch(rig, page):
     seen(page, "page.stop !== null")
 
 
-def record_a_stop(rig):
-    """A machine that was stopped at full speed, with its recording."""
+def record_a_stop(rig, size="log_bytes", seconds=2.5):
+    """A machine that was stopped at full speed, with its recording, which grows for two seconds."""
     rig.start().connected()
     driver = Driver(rig)
     until(lambda: (rig.bus.speed_rpm(0) or 0) >= 9, what="180 mm/s are measured")
     rig.sim.ask("estop press")
-    until(lambda: (found := rig.ask_json("GET", "/api/recordings")[1].get("recordings")) and found[0]["log_bytes"], 8, "a recording")
-    time.sleep(2.5)  # It grows for two seconds.
+    until(lambda: (found := rig.ask_json("GET", "/api/recordings")[1].get("recordings")) and found[0][size], 8, "a recording")
+    time.sleep(seconds)
     driver.end()
 
 
@@ -580,6 +580,7 @@ def fleet_row(name, **other):
 def write_fleet(rig, age_s=0.0):
     now_us = int((time.time() - age_s) * 1e6)
     sentence = "left wheel sent no telemetry for 204 ms while driving 300/300 mm/s; set to zero immediately, latched at 16203.231 s; check the wheel's power and cable, then: iwheelctl reset"
+    unknown = dict.fromkeys(("state", "left_battery_dV", "right_battery_dV", "left_zero", "right_zero", "version"))
     rows = [
         fleet_row("walker-1"),
         fleet_row(
@@ -591,17 +592,7 @@ def write_fleet(rig, age_s=0.0):
             right_zero="doubted",
             contradicted="wheel_radius",
         ),
-        fleet_row(
-            "walker-3",
-            online=False,
-            state=None,
-            left_battery_dV=None,
-            right_battery_dV=None,
-            left_zero=None,
-            right_zero=None,
-            version=None,
-            contradicted="wheel_radius track",
-        ),
+        fleet_row("walker-3", online=False, contradicted="wheel_radius track", **unknown),
         fleet_row("walker-4", cause="<b onclick='x'>x</b>", sentence="<img src=x onerror=alert(1)>", right_battery_dV=None),
     ]
     part = Path(rig.path("fleet.part"))

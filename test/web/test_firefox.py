@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from bus import now_us
 from firefox import ASSETS, firefox_page
-from test_browser import LONG, SIZES, turns
+from test_browser import LONG, SIZES, record_a_stop, turns
 from test_first_screen import AREAS, FIGURES, VIEWS
 from trials import Driver, braking_ms, until
 
@@ -117,12 +117,7 @@ def test_firefox_pad_drives_by_touch_until_released(rig):
 
 
 def test_firefox_plays_a_recording_and_speaks_german(rig):
-    rig.start().connected()
-    driver = Driver(rig)
-    until(lambda: (rig.bus.speed_rpm(0) or 0) >= 9, what="180 mm/s are measured")
-    rig.sim.ask("estop press")
-    until(lambda: (found := rig.ask_json("GET", "/api/recordings")[1].get("recordings")) and found[0]["jsonl_bytes"], 8, "a recording")
-    driver.end()
+    record_a_stop(rig, "jsonl_bytes", 0)
     with firefox_page(rig.url, *SIZES["portrait"], language="de-AT, de") as page:
         page.seen(LIVE)
         assert page.text("#word") == "Gesperrt" and page.evaluate("document.documentElement.lang") == "de"
