@@ -7,7 +7,9 @@ import os
 import pwd
 import queue
 import shutil
+import signal
 import socket
+import subprocess
 import sys
 import threading
 import time
@@ -23,6 +25,7 @@ sys.path[:0] = [str(Path(__file__).resolve().parent.parent / folder) for folder 
 from bus import now_us
 from free_port import free_port
 from harness import WORDS, Process, Rig
+from settings_file import write_settings
 from trials import Skip, until
 
 # These limits fit any machine, however busy; the demonstration has the same.
@@ -108,6 +111,11 @@ class Far:
         answer = self.answer(seq, seconds)
         return {"boot": answer["boot"], "t_us": answer["t_us"]}
 
+    def latest(self):
+        """boot and t_us of the newest state."""
+        state = json.loads(self.texts("state")[-1])
+        return {key: state[key] for key in ("boot", "t_us")}
+
     def answer(self, seq, seconds=3):
         while True:
             try:
@@ -128,6 +136,17 @@ class Far:
     def close(self):
         self.client.disconnect()
         self.client.loop_stop()
+
+
+def await_port(port, host="127.0.0.1", seconds=10, process=None):
+    """Waits until a server listens, of a program that runs."""
+
+    def listens():
+        assert process is None or process.child.poll() is None, process.text()
+        with socket.socket() as one:
+            return one.connect_ex((host, port)) == 0
+
+    until(listens, seconds, f"{host} port {port} listens")
 
 
 def shut(end):
@@ -240,17 +259,35 @@ class MqttRig(Rig):
         self.start_bridge()
         return self
 
+    def start_online(self):
+        """Starts all, and returns an outside client for which the machine is online."""
+        self.start()
+        return self.online()
+
+    def end_bridge(self, number=signal.SIGTERM):
+        self.bridge.signal(number)
+        self.bridge.wait(5)
+
+    def forget_bridge(self):
+        """Ends it; the next one has its own output."""
+        self.bridge.end()
+        os.unlink(self.path("mqtt.out"))
+
+    def at_standstill(self):
+        until(lambda: self.gateway_state()["state"] == "listening", what="stopped")
+
+    def check_bridge(self, setup=None):
+        """(exit code, output) of --check."""
+        command = [self.program("iwheel-mqtt"), "-c", self.path("mqtt.conf"), "--check"]
+        done = subprocess.run(command, capture_output=True, text=True, preexec_fn=setup, check=False)
+        return done.returncode, done.stdout + done.stderr
+
     def start_broker(self):
         Path(self.path("mosquitto.conf")).write_text("\n".join(["listener " + str(self.port) + " 127.0.0.1", *self.broker_lines, ""]), encoding="utf-8")
         self.broker = Process(["mosquitto", "-c", self.path("mosquitto.conf")], self.path("mosquitto.out"))
         self.processes.append(self.broker)
 
-        def listens():
-            assert self.broker.child.poll() is None, self.broker.text()
-            with socket.socket() as one:
-                return one.connect_ex(("127.0.0.1", self.port)) == 0
-
-        until(listens, what="the broker listens")
+        await_port(self.port, process=self.broker)
 
     def bring_broker_back(self, line, far):
         """Starts the broker so that `far` connects before the bridge: a killed broker has no subscribers, and earlier messages would be lost."""
@@ -265,9 +302,7 @@ class MqttRig(Rig):
         self.broker.wait(5)
 
     def start_bridge(self, setup=None, **options):
-        with open(self.path("mqtt.conf"), "w", encoding="utf-8") as file:
-            for section, keys in self.mqtt_settings.items():
-                file.write(f"[{section}]\n" + "".join(f"{key} = {value}\n" for key, value in keys.items()))
+        write_settings(self.path("mqtt.conf"), self.mqtt_settings)
         self.bridge = Process([self.program("iwheel-mqtt"), "-c", self.path("mqtt.conf")], self.path("mqtt.out"), setup, **options)
         self.processes.append(self.bridge)
         return self.bridge

@@ -42,7 +42,7 @@ from bus import now_us
 from harness import die_with_parent, find_program
 from judge_log import percentile
 from free_port import free_port
-from mqtt_rig import MqttRig, put_table
+from mqtt_rig import MqttRig, await_port, put_table
 from trials import ROOT, Skip, until
 
 PAGE = ROOT / "docs/user/mqtt.md"
@@ -279,7 +279,7 @@ class Load:
         self.hosts = [host for host, _ in made]
         self.brokers = [self.spawn(f"broker{number}", command) for number, (_, command) in enumerate(made)]
         for host in self.hosts:
-            until(lambda host=host: socket.socket().connect_ex((host, self.port)) == 0, 30, f"the broker at {host}")
+            await_port(self.port, host, 30)
         time.sleep(3 if len(self.hosts) > 1 else 0)  # The servers need this time to elect a leader.
         self.gateway = Gateway(f"{self.folder}/gateway.sock", self.tape, self.machines, self.rate_hz)
         self.console = self.start_console()

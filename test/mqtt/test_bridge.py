@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 from bus import now_us
+from certificate import NEW_KEY, openssl, self_signed
 from harness import read_only
 from mqtt_rig import ID
 from shifted_clock import ShiftedClock
@@ -73,7 +74,7 @@ def test_gateway_with_a_clock_of_its_own_is_stopped_and_armed(rig):
     count = len(far.messages("state"))
     state = until(lambda: (states := far.messages("state"))[count:] and states[-1], what="a new state")
     assert state["t_us"] > now_us() + 3_000_000_000
-    assert far.ask("stop", quote={key: state[key] for key in ("boot", "t_us")})["ok"]
+    assert far.ask("stop", quote=far.latest())["ok"]
     arm(far)
 
 
@@ -82,8 +83,7 @@ def steer(far, seconds, speed=200, until_time=None):
     until(lambda: far.messages("state"), what="a state")
     end, sent = until_time or time.monotonic() + seconds, 0
     while time.monotonic() < end:
-        state = far.messages("state")[-1]
-        far.ask("drive", quote={"boot": state["boot"], "t_us": state["t_us"]}, wait=False, key=far.key, left_mm_s=speed, right_mm_s=speed)
+        far.ask("drive", quote=far.latest(), wait=False, key=far.key, left_mm_s=speed, right_mm_s=speed)
         sent += 1
         time.sleep(0.05)
     return sent
@@ -93,8 +93,7 @@ def steer(far, seconds, speed=200, until_time=None):
 
 
 def test_topics_match_the_page_and_values_match_the_gateway(rig):
-    rig.start()
-    far = rig.online()
+    far = rig.start_online()
     state = until(lambda: far.messages("state"), what="a state")[-1]
     snapshot = rig.gateway_state()
     assert set(state) - {"boot", "event"} == set(snapshot) - {"id", "ok"}, set(state) ^ set(snapshot)
@@ -116,8 +115,7 @@ def test_topics_match_the_page_and_values_match_the_gateway(rig):
 
 @pytest.mark.rig(settings={"state": {"every_ms": 60000}})
 def test_state_is_sent_on_change_else_at_configured_interval(rig):
-    rig.start()
-    far = rig.online()
+    far = rig.start_online()
     time.sleep(1.5)
     before = len(far.messages("state"))
     assert before <= 1, before
@@ -128,8 +126,7 @@ def test_state_is_sent_on_change_else_at_configured_interval(rig):
 
 
 def test_gateway_gone_or_bridge_killed_is_published_offline(rig):
-    rig.start()
-    far = rig.online()
+    far = rig.start_online()
     rig.gateway.signal(signal.SIGKILL)
     until(lambda: far.texts("availability")[-1] == "offline" and far.messages("info")[-1]["gateway"] == "away", what="gateway away")
     rig.gateway.wait(3)
@@ -194,8 +191,7 @@ def test_home_assistant_gets_sensors_that_are_in_the_state(rig):
 
 
 def test_stop_and_estop_that_are_fresh_stop_the_wheels(rig):
-    rig.start()
-    far = rig.online()
+    far = rig.start_online()
     driver = Driver(rig)
     asked_us = now_us()
     answer = far.ask("stop")
@@ -208,8 +204,7 @@ def test_stop_and_estop_that_are_fresh_stop_the_wheels(rig):
 
 
 def test_command_late_early_or_of_another_boot_stops_nothing(rig):
-    rig.start()
-    far = rig.online()
+    far = rig.start_online()
     driver = Driver(rig)
     old = far.quote()
     fresh = far.ask("why")
@@ -227,8 +222,7 @@ def test_command_late_early_or_of_another_boot_stops_nothing(rig):
 
 
 def test_command_doubled_counts_once(rig):
-    rig.start()
-    far = rig.online()
+    far = rig.start_online()
     quote = far.quote()
     far.seq += 1
     for _ in range(3):
@@ -241,13 +235,11 @@ def test_command_doubled_counts_once(rig):
 
 
 def test_retained_command_does_nothing_now_or_at_any_start(rig):
-    rig.start()
-    far = rig.online()
+    far = rig.start_online()
     driver = Driver(rig)
     far.seq += 1
     quote = far.quote()
-    rig.bridge.signal(signal.SIGTERM)
-    rig.bridge.wait(3)
+    rig.end_bridge()
     far.send("estop", **{"from": far.name, "seq": far.seq, **quote}, retain=True)
     time.sleep(0.3)
     rig.start_bridge()
@@ -258,8 +250,7 @@ def test_retained_command_does_nothing_now_or_at_any_start(rig):
 
 
 def test_garbage_is_dropped_counted_and_changes_nothing(rig):
-    rig.start()
-    far = rig.online()
+    far = rig.start_online()
     quote = far.quote()
     good = {"from": "far", "seq": 1000, **quote}
     garbage = [
@@ -295,8 +286,7 @@ def test_garbage_is_dropped_counted_and_changes_nothing(rig):
 
 
 def test_bridge_that_watches_neither_arms_drives_nor_resets(rig):
-    rig.start()
-    far = rig.online()
+    far = rig.start_online()
     for verb, fields in (("arm", {}), ("drive", {"left_mm_s": 1, "right_mm_s": 1}), ("twist", {"v_mm_s": 1, "yaw_mrad_s": 0}), ("reset", {"stop": 0})):
         answer = far.ask(verb, **fields)
         assert answer["error"] == "denied" and "[drive]" in answer["message"], answer
@@ -304,8 +294,7 @@ def test_bridge_that_watches_neither_arms_drives_nor_resets(rig):
 
 
 def test_recording_is_fetched_in_pieces_with_checksum(rig):
-    rig.start()
-    far = rig.online()
+    far = rig.start_online()
     make_stops(rig, 1)
     name = until(lambda: far.ask("recordings")["recordings"], what="a recording")[0]["name"] + ".conf"
     piece = until(lambda: (reply := far.ask("recording", name=name, offset=0))["ok"] and reply, what="its first piece")
@@ -313,8 +302,7 @@ def test_recording_is_fetched_in_pieces_with_checksum(rig):
 
 
 def test_gateway_that_hangs_stop_is_reported_not_delivered(rig):
-    rig.start()
-    far = rig.online()
+    far = rig.start_online()
     quote = far.quote()
     rig.gateway.signal(signal.SIGSTOP)
     answer = far.ask("stop", quote=quote)
@@ -330,15 +318,14 @@ def example(rig, language):
 
 
 def test_examples_of_the_page_stop_the_wheels(rig):
-    rig.start()
-    rig.online()
+    rig.start_online()
     if not shutil.which("mosquitto_rr"):
         raise Skip("mosquitto-clients is missing (scripts/install_tools check brings it)")
     for command in (["sh", "-c", example(rig, "sh")], [sys.executable, "-c", example(rig, "python")]):
         driver = Driver(rig)
         done = subprocess.run(command, capture_output=True, text=True, timeout=10, check=False)
         assert "stopping" in done.stdout, done
-        until(lambda: rig.gateway_state()["state"] == "listening", what="stopped")
+        rig.at_standstill()
         assert rig.client(name="asker").request("why")["cause"] == "client_stop"
         driver.end()
         time.sleep(0.6)
@@ -356,8 +343,7 @@ DRIVING = {"driving": True, "settings": {"state": {"every_ms": 100}}, "config": 
 
 @pytest.mark.rig(**DRIVING)
 def test_sender_drives_while_it_sends_and_no_longer(rig):
-    rig.start()
-    far = rig.online()
+    far = rig.start_online()
     arm(far)
     steer(far, 1)
     silent_us = now_us()
@@ -371,8 +357,7 @@ def test_sender_drives_while_it_sends_and_no_longer(rig):
 @pytest.mark.rig(**DRIVING)
 def test_broker_stalls_300_ms_wheels_stop_without_late_drive(rig):
     """From the bus log: lease and period after the last command the wheels brake, and the backlog moves nothing."""
-    rig.start()
-    far = rig.online()
+    far = rig.start_online()
     arm(far)
     steer(far, 1)
     assert turns(rig)
@@ -393,26 +378,24 @@ def test_broker_stalls_300_ms_wheels_stop_without_late_drive(rig):
 
 @pytest.mark.rig(**DRIVING)
 def test_broker_killed_while_driving_stops_the_wheels(rig):
-    rig.start()
-    far = rig.online()
+    far = rig.start_online()
     arm(far)
     steer(far, 0.7)
     rig.end_broker()
     killed_us = now_us()
     assert turns(rig) and braking_ms(rig, killed_us) < 400
-    until(lambda: rig.gateway_state()["state"] == "listening", what="stopped")
+    rig.at_standstill()
 
 
 @pytest.mark.rig(**DRIVING)
 def test_bridge_killed_or_frozen_while_driving_stops_the_wheels(rig):
-    rig.start()
-    far = rig.online()
+    far = rig.start_online()
     for number in (signal.SIGSTOP, signal.SIGKILL):
         arm(far)
         steer(far, 0.7)
         rig.bridge.signal(number)
         assert braking_ms(rig, now_us()) < 400
-        until(lambda: rig.gateway_state()["state"] == "listening", what="stopped")
+        rig.at_standstill()
         rig.bridge.signal(signal.SIGCONT)
         time.sleep(0.6)
 
@@ -432,10 +415,15 @@ def settle(far):
     until(lambda: far.messages("info")[-1]["events"]["waiting"] == 0, 20, "the spool is empty")
 
 
+def all_arrive(far, last, seconds):
+    """Each stop once and in order, and every other event."""
+    until(lambda: numbers(far) == list(range(1, last + 1)), seconds, f"all {last}")
+    settle(far)
+
+
 def test_broker_killed_and_back_each_stop_once_in_order(rig):
     line = rig.cut_here()
-    rig.start()
-    far = rig.online()
+    far = rig.start_online()
     make_stops(rig, 2)
     until(lambda: numbers(far) == [1, 2], what="the first two")
     rig.end_broker()
@@ -451,16 +439,14 @@ def test_broker_killed_and_back_each_stop_once_in_order(rig):
 def test_network_cut_at_any_byte_each_stop_once_in_order(rig):
     """A lost confirmation makes a double, which has the same id; nothing makes a gap."""
     line = rig.cut_here()
-    rig.start()
-    far = rig.online()
+    far = rig.start_online()
     line.left = 0
     last = make_stops(rig, 6)
     for byte in (60, 150, 900, 2000, 4000):
         line.left = byte
         until(lambda: line.left <= 0, 40, "cut again")
     line.restore()
-    until(lambda: numbers(far) == list(range(1, last + 1)), 40, "all six")
-    settle(far)
+    all_arrive(far, last, 40)
     far.print_figures("connection cut behind a byte, also in the middle of a confirmation", 6)
 
 
@@ -468,14 +454,12 @@ def test_network_cut_at_any_byte_each_stop_once_in_order(rig):
 @pytest.mark.rig(settings={"broker": {"keepalive_s": 5}})
 def test_network_that_drops_all_is_noticed_and_no_stop_is_lost(rig):
     line = rig.cut_here()
-    rig.start()
-    far = rig.online()
+    far = rig.start_online()
     line.frozen = True
     last = make_stops(rig, 3)
     until(lambda: "no broker" in rig.bridge.text(), 20, "noticed")
     line.frozen = False
-    until(lambda: numbers(far) == list(range(1, last + 1)), 40, "all three")
-    settle(far)
+    all_arrive(far, last, 40)
     far.print_figures("network that loses everything, noticed after 1.5 times `keepalive_s` (`--full`)")
 
 
@@ -490,16 +474,14 @@ def test_bridge_killed_with_stored_events_each_stop_comes_once(rig):
         until(lambda: "connected to the gateway" in rig.bridge.text(), what="the bridge listens")
         stored = make_stops(rig, 2)
         until(lambda number=stored: f'"number":{number},'.encode() in Path(rig.path("spool/events")).read_bytes(), what="stored")
-        rig.bridge.signal(signal.SIGKILL)
-        rig.bridge.wait(3)
+        rig.end_bridge(signal.SIGKILL)
         os.unlink(rig.path("mqtt.out"))
     unseen = make_stops(rig, 1)  # The bridge is down; it learns of the stop from `why` later.
     rig.start_bridge()
     rig.bring_broker_back(line, far)
     until(lambda: numbers(far) == list(range(1, unseen + 1)), 20, f"all {unseen}")
     assert far.events("stop")[-1].get("missed") is True, far.events("stop")[-1]
-    rig.bridge.signal(signal.SIGTERM)
-    rig.bridge.wait(3)
+    rig.end_bridge()
     rig.start_bridge()
     rig.online(far)
     time.sleep(0.5)
@@ -541,8 +523,7 @@ def test_clock_that_steps_changes_neither_ages_nor_order(rig):
     far = rig.online()
     assert far.ask("stop")["ok"] and far.ask("why")["ok"]
     make_stops(rig, 2)
-    until(lambda: numbers(far) == [1, 2], what="both")
-    settle(far)
+    all_arrive(far, 2, 10)
     far.print_figures("wall clock that jumps by two years and back at each reading")
     clocks = [event["heard_wall_us"] for event in far.events()]
     assert max(clocks) - min(clocks) > 86400_000_000, "the clock did step"
@@ -552,8 +533,7 @@ def test_clock_that_steps_changes_neither_ages_nor_order(rig):
 def test_campaign_of_kills_each_stop_once_in_order(rig):
     """Bridge and broker, killed in turn, fifty times."""
     line = rig.cut_here()
-    rig.start()
-    far = rig.online()
+    far = rig.start_online()
     last = 0
     for turn in range(50):
         last = make_stops(rig, 1)
@@ -563,11 +543,9 @@ def test_campaign_of_kills_each_stop_once_in_order(rig):
             last = make_stops(rig, 1)
             rig.bring_broker_back(line, far)
         else:
-            rig.bridge.signal(signal.SIGKILL)
-            rig.bridge.wait(3)
+            rig.end_bridge(signal.SIGKILL)
             rig.start_bridge()
-    until(lambda: numbers(far) == list(range(1, last + 1)), 60, f"all {last}")
-    settle(far)
+    all_arrive(far, last, 60)
     far.print_figures("bridge and broker killed in turn (`--full`)", 50)
 
 
@@ -576,62 +554,12 @@ def test_campaign_of_kills_each_stop_once_in_order(rig):
 
 def make_certificates(rig):
     """Two signers, and certificates of a broker and of the machine."""
-
-    def openssl(*words):
-        done = subprocess.run(["openssl", *words], cwd=rig.folder, capture_output=True, text=True, check=False)
-        assert done.returncode == 0, done.stderr
-
     for name in ("ca", "other"):
-        openssl(
-            "req",
-            "-x509",
-            "-newkey",
-            "ec",
-            "-pkeyopt",
-            "ec_paramgen_curve:prime256v1",
-            "-nodes",
-            "-keyout",
-            f"{name}.key",
-            "-out",
-            f"{name}.pem",
-            "-days",
-            "2",
-            "-subj",
-            f"/CN={name}",
-        )
+        self_signed(rig.folder, name, name)
     for name, subject in (("broker", "localhost"), ("machine", ID)):
-        openssl(
-            "req",
-            "-newkey",
-            "ec",
-            "-pkeyopt",
-            "ec_paramgen_curve:prime256v1",
-            "-nodes",
-            "-keyout",
-            f"{name}.key",
-            "-out",
-            f"{name}.csr",
-            "-subj",
-            f"/CN={subject}",
-        )
+        openssl(rig.folder, f"{NEW_KEY} -subj /CN={subject} -keyout {name}.key -out {name}.csr")
         Path(rig.path(f"{name}.ext")).write_text(f"subjectAltName=DNS:{subject}\n", encoding="ascii")
-        openssl(
-            "x509",
-            "-req",
-            "-in",
-            f"{name}.csr",
-            "-CA",
-            "ca.pem",
-            "-CAkey",
-            "ca.key",
-            "-CAcreateserial",
-            "-out",
-            f"{name}.pem",
-            "-days",
-            "2",
-            "-extfile",
-            f"{name}.ext",
-        )
+        openssl(rig.folder, f"x509 -req -in {name}.csr -CA ca.pem -CAkey ca.key -CAcreateserial -out {name}.pem -days 2 -extfile {name}.ext")
 
 
 def test_tls_needs_signer_name_and_certificate_of_machine(rig):
@@ -683,16 +611,10 @@ def test_credentials_wrong_or_readable_by_others_are_refused(rig):
 
 
 def test_second_bridge_with_the_same_directory_is_refused(rig):
-    rig.start()
-    rig.online()
+    rig.start_online()
     first = rig.bridge
     assert rig.start_bridge().wait(3) == 73 and "another bridge uses it" in rig.bridge.text()
     assert first.child.poll() is None
-
-
-def check_of(rig, setup=None):
-    done = subprocess.run([rig.program("iwheel-mqtt"), "-c", rig.path("mqtt.conf"), "--check"], capture_output=True, text=True, preexec_fn=setup, check=False)
-    return done.returncode, done.stdout + done.stderr
 
 
 def test_check_refuses_a_spool_file_that_the_start_refuses(rig):
@@ -702,10 +624,10 @@ def test_check_refuses_a_spool_file_that_the_start_refuses(rig):
     rig.bridge.end()
     os.link(events, rig.path("second"))
     assert rig.start_bridge().wait(3) == 73
-    code, words = check_of(rig)
+    code, words = rig.check_bridge()
     assert code == 73 and "belongs to another user" in words, words
     os.unlink(rig.path("second"))
-    assert check_of(rig)[0] == 0
+    assert rig.check_bridge()[0] == 0
 
 
 def test_check_of_read_only_spool_warns_and_bridge_starts(rig):
@@ -714,7 +636,7 @@ def test_check_of_read_only_spool_warns_and_bridge_starts(rig):
     mount = read_only(rig.path("spool"))
     assert rig.start_bridge(mount).wait(1) is None, rig.words()
     rig.bridge.end()
-    code, words = check_of(rig, mount)
+    code, words = rig.check_bridge(mount)
     assert code == 0 and "warning" in words and "Read-only file system" in words, words
 
 
@@ -722,7 +644,7 @@ def test_check_judges_everything_and_leaves_no_file(rig):
     rig.start_bridge().end()
     for name in os.listdir(rig.path("spool")):
         os.unlink(os.path.join(rig.path("spool"), name))
-    assert check_of(rig) == (0, "iwheel-mqtt: configuration and files are in order\n") and not os.listdir(rig.path("spool"))
+    assert rig.check_bridge() == (0, "iwheel-mqtt: configuration and files are in order\n") and not os.listdir(rig.path("spool"))
     os.rmdir(rig.path("spool"))
-    code, words = check_of(rig)
+    code, words = rig.check_bridge()
     assert code == 73 and "[spool]" in words, words

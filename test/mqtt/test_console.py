@@ -17,11 +17,10 @@ from datetime import datetime, timezone
 from pathlib import Path
 
 from test_bridge import make_stops, numbers
-from test_fleet import HOSTS, Cluster, use_tls, with_certificate
+from test_fleet import HOSTS, Cluster, start_by_tls, start_one_nats, with_certificate
 from harness import Process
-from free_port import free_port
-from mqtt_rig import ID, Far, Line, paho
-from trials import Skip, until
+from mqtt_rig import ID, Far, Line, await_port, paho
+from trials import until
 
 try:
     from paho.mqtt.packettypes import PacketTypes
@@ -42,6 +41,12 @@ def console(rig, config, *words, timeout=30):
     """(exit code, stdout, stderr)"""
     done = subprocess.run([rig.program("iwheel-fleet"), "-c", config, *words], capture_output=True, text=True, timeout=timeout, check=False)
     return done.returncode, done.stdout, done.stderr
+
+
+def refuses(expected, part, rig, config, *words):
+    """Checks the exit code and a part of the message."""
+    code, _, err = console(rig, config, *words)
+    assert code == expected and part in err, (code, err)
 
 
 def lines(text):
@@ -66,7 +71,7 @@ def cluster_config(rig, cluster, host="", name="console", **keys):
 
 def machine_at(rig, cluster, name="w2"):
     """A machine of the fleet that publishes what the test requests."""
-    until(lambda: socket.socket().connect_ex((HOSTS[1], cluster.mqtt)) == 0, 10, "the server listens")
+    await_port(cluster.mqtt, HOSTS[1])
     far = Far(cluster.mqtt, name, topics=(f"iwheel/{name}/cmd/+",), setup=with_certificate(rig, name), host=HOSTS[1])
     rig.fars.append(far)
     return far
@@ -97,9 +102,7 @@ def test_history_after_lost_leader_has_each_stop_once_and_gaps(rig):
     config = cluster_config(rig, cluster)
     code, out, err = console(rig, config, "history")
     assert code == 0 and out.startswith("0 stops of 0 machines"), (code, out, err)
-    use_tls(rig, " ".join(HOSTS), cluster.mqtt)
-    rig.start_gateway()
-    rig.start_bridge()
+    start_by_tls(rig, " ".join(HOSTS), cluster.mqtt)
     until(lambda: "connected to the broker" in rig.words(), 15, "the bridge is there")
     last = make_stops(rig, 2)
     far = machine_at(rig, cluster)
@@ -166,8 +169,7 @@ def test_history_of_thousands_is_complete_and_read_only(rig):
         assert "Permissions Violation" in nats_says(rig, cluster, "console", subject), subject
     assert "Permissions Violation" in nats_says(rig, cluster, "w2", "$JS.API.CONSUMER.CREATE.iwheel")
     assert cluster.stream("info")[1]["messages"] == 3000
-    code, _, err = console(rig, cluster_config(rig, cluster, name="w2"), "history")
-    assert code == 69 and "users.conf" in err, (code, err)
+    refuses(69, "users.conf", rig, cluster_config(rig, cluster, name="w2"), "history")
     # A machine's certificate is no server certificate: its owner cannot act as the cluster for the console.
     for host in HOSTS:
         cluster.servers[host].signal(9)
@@ -177,9 +179,8 @@ def test_history_of_thousands_is_complete_and_read_only(rig):
     for name in ("pem", "key"):
         shutil.copy(rig.path(f"certs/w2.{name}"), rig.path(f"certs/server.{name}"))
     cluster.start(HOSTS[0])
-    until(lambda: socket.socket().connect_ex((HOSTS[0], cluster.nats)) == 0, 10, "it listens")
-    code, _, err = console(rig, config, "history")
-    assert code == 69 and "SSL" in err, (code, err)
+    await_port(cluster.nats, HOSTS[0])
+    refuses(69, "SSL", rig, config, "history")
 
 
 def nats_says(rig, cluster, name, subject):
@@ -199,8 +200,7 @@ def nats_says(rig, cluster, name, subject):
 
 
 def test_history_without_stream_names_fix_and_info_last_stop(rig):
-    rig.start()
-    rig.online()
+    rig.start_online()
     make_stops(rig, 1)
     config = write_config(rig, port=rig.port)
     until(
@@ -255,8 +255,7 @@ def stop_with_recording(rig, seconds=0.0):
 
 
 def test_recording_is_fetched_whole_and_overwrites_no_file(rig):
-    rig.start()
-    rig.online()
+    rig.start_online()
     name = stop_with_recording(rig)
     config, folder = write_config(rig, port=rig.port), folder_of(rig)
     code, out, err = console(rig, config, "recordings", ID)
@@ -271,12 +270,9 @@ def test_recording_is_fetched_whole_and_overwrites_no_file(rig):
     assert code == 73 and "exists already" in err and len(list(folder.iterdir())) == 3, (code, err)
     result = lines(console(rig, config, "recording", ID, str(int(name.split("-")[1])), "--json", "-o", str(folder / "y"))[1])[0]
     assert result["name"] == name and result["bytes"] == sum(Path(rig.path(name + ending)).stat().st_size for ending in FILES), result
-    code, _, err = console(rig, config, "recording", ID, "99")
-    assert code == 1 and "no recording 99" in err, (code, err)
-    code, _, err = console(rig, config, "recording", "w8", "--wait", "3")
-    assert code == 69 and "no machine w8" in err, (code, err)
-    code, _, err = console(rig, config, "recording", ID, "-o", "/proc/nowhere/x")
-    assert code == 73 and "/proc/nowhere/x" in err, (code, err)
+    refuses(1, "no recording 99", rig, config, "recording", ID, "99")
+    refuses(69, "no machine w8", rig, config, "recording", "w8", "--wait", "3")
+    refuses(73, "/proc/nowhere/x", rig, config, "recording", ID, "-o", "/proc/nowhere/x")
 
 
 def slow_console(rig, *words):
@@ -291,13 +287,11 @@ def slow_console(rig, *words):
 
 
 def test_recording_fetch_continues_after_bridge_restart(rig):
-    rig.start()
-    rig.online()
+    rig.start_online()
     name = stop_with_recording(rig, 3)
     folder = folder_of(rig)
     process = slow_console(rig, "-o", str(folder / "x"))
-    rig.bridge.signal(9)
-    rig.bridge.wait(5)
+    rig.end_bridge(signal.SIGKILL)
     rig.start_bridge()
     assert process.wait(30) == 0, process.text()
     assert int(re.search(r"(\d+) requested again", process.text()).group(1)) > 0, process.text()
@@ -306,12 +300,10 @@ def test_recording_fetch_continues_after_bridge_restart(rig):
 
 
 def test_recording_of_absent_machine_leaves_no_file(rig):
-    rig.start()
-    rig.online()
+    rig.start_online()
     stop_with_recording(rig, 3)
     process = slow_console(rig, "-o", str(folder_of(rig) / "x"), "--wait", "3")
-    rig.bridge.signal(9)
-    rig.bridge.wait(5)
+    rig.end_bridge(signal.SIGKILL)
     assert process.wait(30) == 75 and "has not answered for 3 s and is offline" in process.text(), process.text()
     assert not list(folder_of(rig).iterdir())
     rig.start_bridge()
@@ -468,8 +460,7 @@ def test_mqtt5_event_refused_by_broker_is_stored_and_sent_later(rig):
         encoding="ascii",
     )
     rig.broker_lines.append(f"acl_file {acl}")
-    rig.start()
-    far = rig.online()
+    far = rig.start_online()
     last = make_stops(rig, 2)
     until(lambda: "did not accept" in rig.words() and "Not authorized" in rig.words(), what=f"it is reported: {rig.words()}")
     until(lambda: far.messages("info")[-1]["events"]["aside"] >= 2, what="set aside, and counted")
@@ -482,14 +473,6 @@ def test_mqtt5_event_refused_by_broker_is_stored_and_sent_later(rig):
 
 
 def test_mqtt5_at_a_broker_without_it_names_the_fix(rig):
-    if not shutil.which("nats-server"):
-        raise Skip("nats-server is missing (scripts/install_tools check brings it)")
-    port, mqtt = free_port(), free_port()
-    Path(rig.path("one.conf")).write_text(
-        f'server_name: one\nlisten: 127.0.0.1:{port}\njetstream {{ store_dir: "{rig.path("one")}" }}\nmqtt {{ listen: 127.0.0.1:{mqtt} }}\n', encoding="ascii"
-    )
-    rig.processes.append(Process(["nats-server", "-c", rig.path("one.conf")], rig.path("one.out")))
-    until(lambda: socket.socket().connect_ex(("127.0.0.1", mqtt)) == 0, what="it listens")
-    code, _, err = console(rig, write_config(rig, port=mqtt, protocol=5), "--for", "2")
-    assert code == 69 and "does not support MQTT 5; set protocol = 3.1.1 under [broker]" in err, (code, err)
+    _, mqtt = start_one_nats(rig)
+    refuses(69, "does not support MQTT 5; set protocol = 3.1.1 under [broker]", rig, write_config(rig, port=mqtt, protocol=5), "--for", "2")
     assert console(rig, write_config(rig, port=mqtt), "--for", "1")[0] == 0

@@ -12,7 +12,7 @@ from pathlib import Path
 from test_bridge import make_stops, numbers
 from harness import Process
 from free_port import free_port
-from mqtt_rig import ID, Far
+from mqtt_rig import ID, Far, await_port
 from trials import ROOT, Skip, until
 
 FLEET = ROOT / "share/fleet"
@@ -42,12 +42,34 @@ def use_tls(rig, host, port):
     )
 
 
+def start_by_tls(rig, host, port):
+    use_tls(rig, host, port)
+    rig.start_gateway()
+    rig.start_bridge()
+
+
+def need_nats():
+    if not shutil.which("nats-server"):
+        raise Skip("nats-server is missing (scripts/install_tools check brings it)")
+
+
+def start_one_nats(rig):
+    """A single nats-server with a stream engine. Returns its port and that of MQTT."""
+    need_nats()
+    port, mqtt = free_port(), free_port()
+    Path(rig.path("one.conf")).write_text(
+        f'server_name: one\nlisten: 127.0.0.1:{port}\njetstream {{ store_dir: "{rig.path("one")}" }}\nmqtt {{ listen: 127.0.0.1:{mqtt} }}\n', encoding="ascii"
+    )
+    rig.processes.append(Process(["nats-server", "-c", rig.path("one.conf")], rig.path("one.out")))
+    await_port(mqtt)
+    return port, mqtt
+
+
 class Cluster:
     """Three nats-servers with the shipped configuration, on three addresses of this machine."""
 
     def __init__(self, rig):
-        if not shutil.which("nats-server"):
-            raise Skip("nats-server is missing (scripts/install_tools check brings it)")
+        need_nats()
         make_certificates(rig)
         self.rig, self.servers = rig, {}
         self.nats, self.mqtt, self.routes = free_port(), free_port(), free_port()
@@ -86,7 +108,7 @@ class Cluster:
 
 def collector(rig, cluster, host, topics=("iwheel/+/event/+", "iwheel/+/availability")):
     """A session that outlasts its connection, so the cluster stores the events for it that it has confirmed to a machine."""
-    until(lambda: socket.socket().connect_ex((host, cluster.mqtt)) == 0, 10, "the server listens")
+    await_port(cluster.mqtt, host)
     far = Far(cluster.mqtt, "console", topics=topics, setup=with_certificate(rig, "console"), host=host, clean=False)
     rig.fars.append(far)
     return far
@@ -97,9 +119,7 @@ def test_three_servers_leader_killed_each_stop_once_in_order(rig):
     leader = cluster.leader()
     others = [host for host in HOSTS if host != leader]
     far = collector(rig, cluster, others[0])
-    use_tls(rig, " ".join((leader, others[1], others[0])), cluster.mqtt)
-    rig.start_gateway()
-    rig.start_bridge()
+    start_by_tls(rig, " ".join((leader, others[1], others[0])), cluster.mqtt)
     until(lambda: far.texts("availability")[-1:] == ["online"], 15, f"online: {rig.words()}")
     first = make_stops(rig, 2)
     until(lambda: numbers(far) == list(range(1, first + 1)), 15, "the first")
@@ -115,14 +135,7 @@ def test_three_servers_leader_killed_each_stop_once_in_order(rig):
 
 def test_confirmation_does_not_wait_for_a_stream_of_yours(rig):
     """docs/user/mqtt.md states about nats-server: a stream that accepts nothing withholds no confirmation, so a stream alone proves nothing."""
-    if not shutil.which("nats-server"):
-        raise Skip("nats-server is missing (scripts/install_tools check brings it)")
-    port, mqtt = free_port(), free_port()
-    Path(rig.path("one.conf")).write_text(
-        f'server_name: one\nlisten: 127.0.0.1:{port}\njetstream {{ store_dir: "{rig.path("one")}" }}\nmqtt {{ listen: 127.0.0.1:{mqtt} }}\n', encoding="ascii"
-    )
-    rig.processes.append(Process(["nats-server", "-c", rig.path("one.conf")], rig.path("one.out")))
-    until(lambda: socket.socket().connect_ex(("127.0.0.1", mqtt)) == 0, what="it listens")
+    port, mqtt = start_one_nats(rig)
 
     def ask(subject, body):
         with socket.create_connection(("127.0.0.1", port), timeout=5) as link, link.makefile("rb") as lines:
@@ -150,7 +163,7 @@ def start_fleet_broker(rig):
     text = text.replace("/etc/mosquitto/iwheel.acl", str(FLEET / "mosquitto.acl")).replace("/var/lib/mosquitto/", rig.path("") + "/")
     Path(rig.path("fleet.conf")).write_text(text + rig.broker_lines[-1] + "\n", encoding="utf-8")
     rig.processes.append(Process(["mosquitto", "-c", rig.path("fleet.conf")], rig.path("fleet.out")))
-    until(lambda: socket.socket().connect_ex(("127.0.0.1", port)) == 0, what="it listens")
+    await_port(port)
     return port
 
 
@@ -189,7 +202,7 @@ def test_forwarding_mosquitto_stores_while_fleet_is_down(rig):
     Path(rig.path("forward.conf")).write_text(text + rig.broker_lines[-1] + "\n", encoding="utf-8")
     rig.start_gateway()
     rig.processes.append(Process(["mosquitto", "-c", rig.path("forward.conf")], rig.path("forward.out")))
-    until(lambda: socket.socket().connect_ex(("127.0.0.1", rig.port)) == 0, what="it listens")
+    await_port(rig.port)
     rig.start_bridge()
     console = fleet_far(rig, port, "console", clean=False)
     until(lambda: console.texts("availability")[-1:] == ["online"], 15, "online, forwarded")
@@ -204,8 +217,7 @@ def test_forwarding_mosquitto_stores_while_fleet_is_down(rig):
 
 
 def test_console_shows_online_and_stopped_machines(rig):
-    rig.start()
-    rig.online()
+    rig.start_online()
     config = Path(rig.path("fleet.conf"))
     config.write_text(f"[broker]\nport = {rig.port}\n", encoding="ascii")
     rig.far().client.publish("iwheel/w9/availability", "offline", qos=1, retain=True).wait_for_publish(3)

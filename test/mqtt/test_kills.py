@@ -12,7 +12,7 @@ import pytest
 from test_bridge import numbers
 from test_console import cluster_config, console, lines
 from test_fleet import HOSTS, Cluster, collector, use_tls
-from mqtt_rig import ID
+from mqtt_rig import ID, await_port
 from trials import until
 
 KILLS = int(os.environ.get("IWHEEL_KILLS", "4"))
@@ -101,7 +101,7 @@ def kill_and_stop(rig, cluster, teller, host):
         teller.stop()
         time.sleep(0.7)
     cluster.start(host)
-    until(lambda: socket.socket().connect_ex((host, cluster.mqtt)) == 0, 20, "it is back")
+    await_port(cluster.mqtt, host, 20)
     until(lambda: cluster.stream("info")[0] == 0, 30, "the stream answers")
 
 

@@ -27,11 +27,11 @@ class Flood(threading.Thread):
     def run(self):
         begun = time.monotonic()
         while not self.ended.wait(0.005):
-            state = json.loads(self.far.texts("state")[-1])
+            quote = self.far.latest()
             while self.sent < (time.monotonic() - begun) * self.rate and not self.ended.is_set():
                 self.sent += 1
                 sender = self.far.name if self.names == 1 else f"{self.far.name}-{self.sent % self.names}"
-                self.far.send(self.verb, **{"from": sender, "seq": self.sent, "boot": state["boot"], "t_us": state["t_us"], **self.fields})
+                self.far.send(self.verb, **{"from": sender, "seq": self.sent, **quote, **self.fields})
 
     def end(self):
         self.ended.set()
@@ -47,7 +47,7 @@ def stops_in_time(rig, far, times=5):
         far.ask("stop", quote=quote, wait=False)
         delays.append(braking_ms(rig, asked_us))
         driver.end()
-        until(lambda: rig.gateway_state()["state"] == "listening", what="stopped")
+        rig.at_standstill()
         time.sleep(0.6)
     print("        command to bus, ms:", " ".join(f"{delay:.0f}" for delay in delays), flush=True)
     assert max(delays) < STOP_MS, delays
@@ -55,8 +55,7 @@ def stops_in_time(rig, far, times=5):
 
 @pytest.mark.rig(settings={"state": {"every_ms": 100}})
 def test_stop_never_waits_behind_questions(rig):
-    rig.start()
-    far = rig.online()
+    far = rig.start_online()
     flood = Flood(rig, "why", 400)
     stops_in_time(rig, far)
     flood.end()
@@ -66,8 +65,7 @@ def test_stop_never_waits_behind_questions(rig):
 @pytest.mark.rig(settings={"state": {"every_ms": 100}})
 def test_stop_never_refused_for_other_senders(rig):
     """There are more senders than the bridge stores, and one that uses up the numbers of the person who stops."""
-    rig.start()
-    far = rig.online()
+    far = rig.start_online()
     crowd = Flood(rig, "hello", 100, name="crowd", names=40)
     why = Flood(rig, "why", 100, name="many", names=40)
     thief = rig.far("thief")
@@ -77,15 +75,10 @@ def test_stop_never_refused_for_other_senders(rig):
         reply = far.ask("stop")
         assert reply["ok"], reply
         driver.end()
-        until(lambda: rig.gateway_state()["state"] == "listening", what="stopped")
+        rig.at_standstill()
         time.sleep(0.6)
     crowd.end()
     why.end()
-
-
-def latest(far):
-    state = far.messages("state")[-1]
-    return {"boot": state["boot"], "t_us": state["t_us"]}
 
 
 class Hand(threading.Thread):
@@ -99,7 +92,7 @@ class Hand(threading.Thread):
     def run(self):
         steer(self.far, 0, self.speed, until_time=time.monotonic() + 0.05)
         while not self.ended.wait(0.05):
-            self.far.ask("drive", quote=latest(self.far), wait=False, key=self.far.key, left_mm_s=self.speed, right_mm_s=self.speed)
+            self.far.ask("drive", quote=self.far.latest(), wait=False, key=self.far.key, left_mm_s=self.speed, right_mm_s=self.speed)
 
     def end(self):
         self.ended.set()
@@ -177,8 +170,7 @@ def test_one_person_with_a_deflected_stick_refuses_arm_and_reset(rig):
 
 @pytest.mark.rig(**DRIVING)
 def test_one_person_resets_only_the_stop_that_is_meant(rig):
-    rig.start()
-    far = rig.online()
+    far = rig.start_online()
     rig.press()
     rig.press(False)
     number = until(lambda: far.ask("why")["number"], what="a stop")

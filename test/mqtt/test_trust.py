@@ -3,7 +3,6 @@
 
 import os
 import shutil
-import subprocess
 import sys
 import time
 from pathlib import Path
@@ -11,9 +10,10 @@ from pathlib import Path
 import pytest
 from test_bridge import arm, make_certificates as sign, make_stops, numbers, steer, turns
 from test_console import console, write_config
-from test_fleet import HOSTS, Cluster, certificates, fleet_far, start_fleet_broker, use_tls, with_certificate
+from test_fleet import HOSTS, Cluster, certificates, fleet_far, start_by_tls, start_fleet_broker, use_tls, with_certificate
 from harness import Process
 from mqtt_rig import ID, Far, Line, paho
+from settings_file import write_settings
 from trials import Skip, until
 
 STRANGER = 65534
@@ -33,8 +33,7 @@ def test_event_too_large_is_set_aside_and_later_ones_go(rig):
     """The broker's largest packet is smaller than a stop, info and state: messages that fit arrive, the rest after they fit."""
     rig.broker_lines.append("max_packet_size 420")
     line = rig.cut_here()
-    rig.start()
-    far = rig.online()
+    far = rig.start_online()
     last = make_stops(rig, 3)
     until(lambda: len(far.events("estop")) == 2 * last, what="events that fit")
     until(lambda: "did not accept" in rig.words() and "/event/stop" in rig.words(), what=f"it is reported: {rig.words()}")
@@ -66,8 +65,7 @@ def test_event_that_ends_each_connection_is_set_aside(rig):
     line = Choosy(rig.port, b"event/lease")
     rig.fars.append(line)
     rig.mqtt_settings["broker"]["port"] = line.port
-    rig.start()
-    far = rig.online()
+    far = rig.start_online()
     client = rig.client(name="walker")
     until(lambda: client.request("arm", name="walker")["ok"], what="armed")
     until(lambda: "the connection ended each time" in rig.words(), 30, f"set aside: {rig.words()}")
@@ -95,30 +93,24 @@ def thief(rig, port, name, certificate, host="127.0.0.1", **options):
 
 def test_machine_cannot_use_the_name_of_another_at_mosquitto(rig):
     port = start_fleet_broker(rig)
-    use_tls(rig, "localhost", port)
-    rig.start_gateway()
-    rig.start_bridge()
+    start_by_tls(rig, "localhost", port)
     console_far = fleet_far(rig, port, "console")
     until(lambda: console_far.texts("availability")[-1:] == ["online"], 15, f"online: {rig.words()}")
-    thieves = [thief(rig, port, name, "w2") for name in ("w1", "iwheel-w1")]
+    for name in ("w1", "iwheel-w1"):
+        thief(rig, port, name, "w2")
     time.sleep(3)
     assert console_far.ask("stop")["ok"] and console_far.texts("availability") == ["online"], rig.words()
-    for one in thieves:
-        one.close()
 
 
 def test_machine_cannot_use_the_name_of_another_at_nats(rig):
     """nats-server ties no name to a user: the bridge's name is random in each run, so no other client can know it."""
     cluster = Cluster(rig)
-    use_tls(rig, HOSTS[0], cluster.mqtt)
-    rig.start_gateway()
-    rig.start_bridge()
+    start_by_tls(rig, HOSTS[0], cluster.mqtt)
     until(lambda: "connected to the broker" in rig.words(), 30, rig.words())
-    thieves = [thief(rig, cluster.mqtt, name, "w2", HOSTS[0]) for name in ("w1", "iwheel-w1")]
+    for name in ("w1", "iwheel-w1"):
+        thief(rig, cluster.mqtt, name, "w2", HOSTS[0])
     time.sleep(3)
     assert rig.words().count("connected to the broker") == 1 and "is used by another" not in rig.words(), rig.words()
-    for one in thieves:
-        one.close()
 
 
 def test_name_used_by_another_client_is_reported(rig):
@@ -133,8 +125,7 @@ def test_name_used_by_another_client_is_reported(rig):
         one = thief(rig, port, "any", ID)
         until(lambda: "is used by another client" in rig.words(), 20, f"reported, protocol {protocol}: {rig.words()}")
         one.close()
-        rig.bridge.end()
-        os.unlink(rig.path("mqtt.out"))
+        rig.forget_bridge()
 
 
 # ---- the identity of the broker -------------------------------------------------------------------------------------
@@ -192,8 +183,7 @@ def test_broker_of_a_stranger_does_not_drive(rig):
     rig.start()
     until(lambda: "belongs to user 65534" in rig.words(), 10, f"refused: {rig.words()}")
     assert "connected to the broker" not in rig.words()
-    rig.bridge.end()
-    os.unlink(rig.path("mqtt.out"))
+    rig.forget_bridge()
     rig.mqtt_settings["broker"]["process_user"] = "nobody"
     rig.start_bridge()
     rig.online()
@@ -205,8 +195,7 @@ def test_broker_on_a_unix_socket_drives_if_its_user_is_right(rig):
     path = rig.path("broker.sock")
     rig.broker_lines.append(f"listener 0 {path}")
     rig.mqtt_settings["broker"]["host"] = path
-    rig.start()
-    far = rig.online()
+    far = rig.start_online()
     assert arm(far)
     steer(far, 0.7)
     assert turns(rig)
@@ -231,16 +220,9 @@ def test_broker_on_a_unix_socket_drives_if_its_user_is_right(rig):
     until(lambda: "belongs to user 65534" in rig.words(), 10, f"refused: {rig.words()}")
 
 
-def check(rig):
-    done = subprocess.run([rig.program("iwheel-mqtt"), "-c", rig.path("mqtt.conf"), "--check"], capture_output=True, text=True, check=False)
-    return done.returncode, done.stdout + done.stderr
-
-
-def write_settings(rig, **broker):
+def write_broker(rig, **broker):
     rig.mqtt_settings["broker"].update(broker)
-    with open(rig.path("mqtt.conf"), "w", encoding="utf-8") as file:
-        for section, keys in rig.mqtt_settings.items():
-            file.write(f"[{section}]\n" + "".join(f"{key} = {value}\n" for key, value in keys.items()))
+    write_settings(rig.path("mqtt.conf"), rig.mqtt_settings)
 
 
 def test_host_that_only_begins_like_loopback_is_another_machine(rig):
@@ -253,11 +235,11 @@ def test_host_that_only_begins_like_loopback_is_another_machine(rig):
         ("localhost", 0),
         ("/run/broker.sock", 0),
     ):
-        write_settings(rig, host=host)
-        assert check(rig)[0] == code, (host, check(rig))
+        write_broker(rig, host=host)
+        assert rig.check_bridge()[0] == code, (host, rig.check_bridge())
     rig.mqtt_settings["drive"]["enabled"] = "yes"
-    write_settings(rig, host="10.0.0.1", allow_plain="yes")
-    code, words = check(rig)
+    write_broker(rig, host="10.0.0.1", allow_plain="yes")
+    code, words = rig.check_bridge()
     assert code == 78 and "needs TLS" in words, words
 
 
@@ -267,10 +249,10 @@ def test_host_that_only_begins_like_loopback_is_another_machine(rig):
 def test_key_that_others_may_read_is_refused(rig):
     sign(rig)
     key = Path(rig.path("machine.key"))
-    write_settings(rig, host="localhost", ca=rig.path("ca.pem"), certificate=rig.path("machine.pem"), key=str(key))
+    write_broker(rig, host="localhost", ca=rig.path("ca.pem"), certificate=rig.path("machine.pem"), key=str(key))
     for mode, code in ((0o644, 77), (0o640, 77 if os.geteuid() else 0), (0o600, 0)):
         key.chmod(mode)
-        checked = check(rig)
+        checked = rig.check_bridge()
         assert checked[0] == code, (oct(mode), checked)
         assert code or rig.start_bridge().child.poll() is None, oct(mode)
         rig.bridge and rig.bridge.end()
@@ -292,8 +274,7 @@ def test_spool_of_other_owner_is_refused_and_no_link_followed(rig):
         undo()
         os.unlink(rig.path("mqtt.out"))
     os.link(other, spool / "events.new")
-    rig.start()
-    rig.online()
+    rig.start_online()
     assert other.read_text(encoding="ascii") == "of somebody"
     rig.bridge.end()
     shutil.move(spool, rig.path("moved"))
@@ -309,9 +290,7 @@ def test_spool_of_other_owner_is_refused_and_no_link_followed(rig):
 def test_home_assistant_sensors_pass_shipped_mosquitto_rights(rig):
     port = start_fleet_broker(rig)
     certificates(rig, "console", "homeassistant")
-    use_tls(rig, "localhost", port)
-    rig.start_gateway()
-    rig.start_bridge()
+    start_by_tls(rig, "localhost", port)
     sensors = fleet_far(rig, port, "homeassistant", topics=("homeassistant/#", "iwheel/+/availability"))
     until(lambda: len([1 for topic, *_ in sensors.all if topic.startswith("homeassistant/")]) == 10, 15, rig.words())
     console_far = fleet_far(rig, port, "console")
@@ -330,9 +309,7 @@ def test_home_assistant_sensors_pass_shipped_mosquitto_rights(rig):
 @pytest.mark.rig(settings={"home_assistant": {"enabled": "yes"}})
 def test_home_assistant_sensors_pass_the_shipped_rights_of_nats(rig):
     cluster = Cluster(rig)
-    use_tls(rig, HOSTS[0], cluster.mqtt)
-    rig.start_gateway()
-    rig.start_bridge()
+    start_by_tls(rig, HOSTS[0], cluster.mqtt)
     console_far = Far(cluster.mqtt, "console", topics=("iwheel/+/info",), setup=with_certificate(rig, "console"), host=HOSTS[0])
     rig.fars.append(console_far)
     until(
@@ -347,7 +324,6 @@ def test_home_assistant_sensors_that_are_refused_are_reported(rig):
     acl = Path(rig.path("acl"))
     acl.write_text("topic readwrite iwheel/#\n", encoding="ascii")
     rig.broker_lines.append(f"acl_file {acl}")
-    rig.start()
-    far = rig.online()
+    far = rig.start_online()
     until(lambda: "sensors that the broker forwarded: 0 of 10" in rig.words(), 15, rig.words())
     until(lambda: far.messages("info")[-1]["home_assistant"] == {"sensors": 10, "passed_on": 0}, what="in info")
