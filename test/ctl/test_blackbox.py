@@ -21,6 +21,7 @@ import ctl
 import pytest
 from client import Streamer
 from harness import Rig, children
+from trials import until
 
 
 def read(path):
@@ -55,6 +56,11 @@ class WithRig(unittest.TestCase):
         time.sleep(seconds)
         return stream
 
+    def press_and_end(self, stream):
+        self.rig.press()
+        time.sleep(0.3)
+        stream.stop()
+
     def recordings(self, ending="log"):
         return sorted(glob.glob(os.path.join(self.folder, f"stop-*.{ending}")))
 
@@ -75,14 +81,10 @@ class WithRig(unittest.TestCase):
 
     def stop_by_button(self, seconds=1.0):
         stream = self.drive(seconds)
-        self.rig.press()
-        time.sleep(0.3)
-        stream.stop()
+        self.press_and_end(stream)
         stem = self.wait_whole(1)
         # The writer reports to the gateway only after that.
-        end = time.monotonic() + 5
-        while f"is recorded in {stem}.log" not in self.rig.gateway.text() and time.monotonic() < end:
-            time.sleep(0.02)
+        until(lambda: f"is recorded in {stem}.log" in self.rig.gateway.text(), 5)
         return stem
 
 
@@ -176,9 +178,7 @@ class BlackBox(WithRig):
         writer = children(self.rig.gateway.child.pid)["iwheel-blackbox"]
         os.kill(writer, signal.SIGSTOP)
         stream = self.drive(0.6)
-        self.rig.press()
-        time.sleep(0.3)
-        stream.stop()
+        self.press_and_end(stream)
         self.assertEqual("estop_line", self.why()["cause"])
         self.assertIsNone(self.why()["recording"])
         self.assertEqual([], self.recordings())
@@ -404,9 +404,7 @@ class ShortBox(WithRig):
 
     def test_recording_that_begins_during_a_drive_is_replayed(self):
         stream = self.drive(4.0, 300, -200)
-        self.rig.press()
-        time.sleep(0.3)
-        stream.stop()
+        self.press_and_end(stream)
         _, out, err = self.ctl("replay", self.wait_whole(1) + ".log")
         self.assertEqual("", err)
         self.assertIn("its state is restored", out)
@@ -461,9 +459,7 @@ class Record(WithRig):
     def test_interrupted_recording_is_whole(self):
         path = self.rig.path("three.log")
         child = ctl.start("--socket", self.rig.path("gateway.sock"), "record", path, stderr=subprocess.PIPE, text=True)
-        end = time.monotonic() + 20
-        while (not os.path.exists(path) or read(path).count("\n") <= 800) and time.monotonic() < end:
-            time.sleep(0.05)
+        until(lambda: os.path.exists(path) and read(path).count("\n") > 800, 20, "800 frames")
         child.send_signal(signal.SIGINT)
         _, err = child.communicate(timeout=10)
         self.assertEqual(0, child.returncode, err)

@@ -67,11 +67,14 @@ class Bringup(unittest.TestCase):
         operator.answer("finger on the e-stop?", "y")
         return operator
 
+    def simulate_after(self, operator, text, command):
+        """Waits for the text; then the wheels or the button change."""
+        operator.expect(text)
+        self.rig.sim.ask(command)
+
     def press_and_release(self, operator):
-        operator.expect("Press the e-stop button now")
-        self.rig.sim.ask("estop press")
-        operator.expect("Release it")
-        self.rig.sim.ask("estop release")
+        self.simulate_after(operator, "Press the e-stop button now", "estop press")
+        self.simulate_after(operator, "Release it", "estop release")
 
     def end(self, operator):
         self.killed = self.killed or operator.process.poll() is None
@@ -130,8 +133,7 @@ class Bringup(unittest.TestCase):
 
     def answer_after(self, command, operator, question, line):
         """The wheels or the button change between the question and its answer."""
-        operator.expect(question)
-        self.rig.sim.ask(command)
+        self.simulate_after(operator, question, command)
         operator.seen -= len(question)
         operator.answer(question, line)
 
@@ -159,11 +161,9 @@ class Bringup(unittest.TestCase):
     def weigh(self, operator, side, mass_kg):
         self.begin_to_weigh(operator, side, mass_kg)
         operator.expect("measuring")
-        operator.expect("put the mass on")
-        self.rig.sim.ask(f"load {side} {mass_kg * GRAVITY:.2f}")
+        self.simulate_after(operator, "put the mass on", f"load {side} {mass_kg * GRAVITY:.2f}")
         operator.type("\n")
-        operator.expect("the unit is")
-        self.rig.sim.ask(f"load {side} 0")
+        self.simulate_after(operator, "the unit is", f"load {side} 0")
 
     def move_and_enter(self, operator, *commands):
         """One movement after the other."""
@@ -213,8 +213,7 @@ class Bringup(unittest.TestCase):
     def push(self, operator, distance_m, left_m, right_m):
         operator.answer("Distance in m", str(distance_m))
         operator.answer("Place the machine at the start mark", "")
-        operator.expect("press Enter ...")
-        self.rig.sim.ask(f"push left {left_m}")
+        self.simulate_after(operator, "press Enter ...", f"push left {left_m}")
         self.rig.sim.ask(f"push right {right_m}")
         self.stand_and_enter(operator)
 
@@ -327,15 +326,13 @@ class Bringup(unittest.TestCase):
 
     def test_wheel_blocked_in_current_test_is_found_by_turning_zero(self):
         operator = self.held_during_the_tries()
-        operator.expect("may be a limit")
-        self.rig.sim.ask("unblock both")
+        self.simulate_after(operator, "may be a limit", "unblock both")
         operator.expect("It TURNED")
         self.assertEqual("setpoint", self.offered(operator, "current_role"))
 
     def test_wheel_running_away_unobserved_is_found_by_the_stop(self):
         operator = self.held_during_the_tries()
-        operator.expect("Neither wheel may turn")
-        self.rig.sim.ask("unblock both")
+        self.simulate_after(operator, "Neither wheel may turn", "unblock both")
         operator.expect("any key stops it")
         operator.process.send_signal(signal.SIGSTOP)  # Hangs, while the gateway sees a wheel run away.
         time.sleep(1.5)
@@ -351,8 +348,7 @@ class Bringup(unittest.TestCase):
         self.rig.sim.ask("role setpoint")
         operator = self.begin()
         self.find_type(operator, "7")
-        operator.expect("any key stops it")
-        self.rig.sim.ask("mute left")
+        self.simulate_after(operator, "any key stops it", "mute left")
         self.assertRegex(operator.expect("Try again?"), "left wheel (is )?(offline|not heard|sent no telemetry)")
         self.rig.sim.ask("unmute left")
         operator.type("y\n")
@@ -395,8 +391,7 @@ class Bringup(unittest.TestCase):
         operator.expect("types to try")
         operator.expect("] ")
         operator.type("1\n ")  # The second key comes while the trial gateway starts.
-        operator.expect("did not start: a key was pressed")
-        self.rig.sim.ask("push left 3")
+        self.simulate_after(operator, "did not start: a key was pressed", "push left 3")
         operator.answer("Try again?", "y")
         operator.expect("any key stops it")
         time.sleep(0.3)
@@ -570,8 +565,7 @@ class Bringup(unittest.TestCase):
         operator.answer("types to try", "1")
         self.answer_after("block both", operator, "Did both wheels turn", "y")
         operator.expect("the result counts only if both wheels turn")
-        operator.expect("Now no wheel turned")
-        self.rig.sim.ask("unblock both")
+        self.simulate_after(operator, "Now no wheel turned", "unblock both")
         self.assertEqual("?", self.offered(operator, "current_role"))
         operator.type("limit\n")
         self.look_at_signs_only(operator)
@@ -584,8 +578,7 @@ class Bringup(unittest.TestCase):
         operator.answer("types to try", "1")
         self.answer_after("block right", operator, "Did both wheels turn", "y")
         operator.expect("The current alone turned the left wheel")
-        operator.expect("only one wheel showed it")
-        self.rig.sim.ask("unblock right")
+        self.simulate_after(operator, "only one wheel showed it", "unblock right")
         operator.answer("current_role", "")
         self.look_at_signs_only(operator)
         self.assertEqual("noted: 250 mA without speed turned the left wheel", self.write(operator)["current_role"])
@@ -598,8 +591,7 @@ class Bringup(unittest.TestCase):
             operator.answer(f"Watch the {side} wheel", "")
             operator.answer("r: repeat)", "f")
         self.answer_after("block left", operator, "Now both", "")
-        operator.expect("The bus shows that a wheel did not turn forwards")
-        self.rig.sim.ask("unblock left")
+        self.simulate_after(operator, "The bus shows that a wheel did not turn forwards", "unblock left")
         self.look_at_signs(operator, mirrored=())
         self.quit_at(operator, "Measure the force?")
 
@@ -616,14 +608,12 @@ class Bringup(unittest.TestCase):
         self.look_at_signs(operator, mirrored=())
         operator.answer("Measure the force?", "y")
         self.begin_to_weigh(operator, "left")
-        operator.expect("put the mass on")
-        self.rig.sim.ask("raw left 32767")
+        self.simulate_after(operator, "put the mass on", "raw left 32767")
         operator.type("\n")
         operator.expect("at the end of its range")
         operator.answer("Try again?", "n")
         self.begin_to_weigh(operator, "right")
-        operator.expect("put the mass on")
-        self.rig.sim.ask("load right 49")
+        self.simulate_after(operator, "put the mass on", "load right 49")
         operator.type("\n")
         operator.expect("measuring for 2 s")
         time.sleep(0.7)
@@ -714,8 +704,7 @@ class Bringup(unittest.TestCase):
     def begin_to_turn(self, operator):
         operator.answer("How many full turns", "3")
         operator.answer("Point the machine at the mark", "")
-        operator.expect("press Enter ...")
-        self.rig.sim.ask("turn 3")
+        self.simulate_after(operator, "press Enter ...", "turn 3")
         time.sleep(0.5)
 
     # --- a disturbed step, and results that are saved --------------------------------------------------------------
@@ -825,8 +814,7 @@ class Bringup(unittest.TestCase):
         folder = os.path.dirname(command.split(b"\0")[2].decode())
         self.assertRegex(folder, "^/tmp/iwheel-bringup-")
         self.rig.sim.ask("estop press")  # A stop, which the gateway records.
-        operator.expect("Release it")
-        self.rig.sim.ask("estop release")
+        self.simulate_after(operator, "Release it", "estop release")
         operator.answer("Turn the wheels by hand?", "q")
         self.ends_soon(operator)
         self.assertFalse(os.path.exists(folder))

@@ -12,6 +12,7 @@ import unittest
 
 from ctl import program, run
 from operator_at_terminal import Operator
+from trials import until
 
 # Fields of `status` that each key changes, and the new values; a second press restores them.
 TOGGLES = {
@@ -47,10 +48,7 @@ class Keys(unittest.TestCase):
         return json.loads(run("--control", self.control, "status", name="iwheel-sim")[1].removeprefix("ok "))
 
     def wait_for(self, holds, what):
-        end = time.monotonic() + 5
-        while not holds(self.status()):
-            self.assertLess(time.monotonic(), end, what)
-            time.sleep(0.01)
+        until(lambda: holds(self.status()), 5, what)
 
     def test_each_key_injects_reports_and_removes_its_fault(self):
         operator = self.start()
