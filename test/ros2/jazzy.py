@@ -22,6 +22,17 @@ PROFILES = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")  
 CLI = "import sys; from ros2cli.cli import main; sys.exit(main())"
 
 
+def compiled(t, name, sources, *options, newer=()):
+    """The path of a C++ program in the build, compiled if a source or another file is newer."""
+    program = os.path.join(os.path.abspath(t.build), name)
+    if not os.path.exists(program) or os.path.getmtime(program) < max(map(os.path.getmtime, [*sources, *newer])):
+        own = f"{program}.{os.getpid()}"  # Another scenario may compile it in parallel.
+        done = subprocess.run(["c++", "-std=c++17", "-o", own, *sources, *options], capture_output=True, text=True, timeout=100, check=False)
+        t.check(done.returncode == 0, f"it does not compile: {done.stderr[-800:]}")
+        os.replace(own, program)
+    return program
+
+
 class Jazzy:
     def __init__(self, domain, vendor="fastrtps", profile=True):
         self.folder = os.path.abspath(os.environ.get("IWHEEL_ROS", os.path.join(ROOT, "build", "ros-jazzy")))

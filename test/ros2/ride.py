@@ -13,6 +13,7 @@ from free_domain import free_domain
 from harness import Process, wait_connect
 from judge_log import Event
 from peer import Peer
+from settings_file import write_settings
 
 TIMELINE = {"arm": "arm", "drive": "drive", "twist": "drive", "stop": "stop", "disarm": "stop", "estop": "estop", "reset": "reset"}
 
@@ -129,9 +130,7 @@ class Ride:
         self.domain = ros["domain"] = ros.get("domain") or free_domain()
         self.tap = Tap(self.rig.path("tap.sock"), self.rig.path("gateway.sock"), self.rig.timeline)
         self.conf = self.rig.path("ros2.conf")
-        with open(self.conf, "w", encoding="utf-8") as file:
-            for section, keys in self.settings.items():
-                file.write(f"[{section}]\n" + "".join(f"{key} = {value}\n" for key, value in keys.items()))
+        write_settings(self.conf, self.settings)
         if gateway:
             self.rig.start_gateway()
             self.client = self.rig.client()
@@ -193,6 +192,18 @@ class Ride:
         self.t.check(self.moving(), f"the wheels are driven: {self.client.request('status')['state']}, {self.bridge.text()[-300:]}")
         return stream
 
+    def resumes(self, stream, seconds, what, v=0.3):
+        """The publisher of an earlier stream sends again, and the wheels turn; returns the new stream."""
+        stream = self.stream(v, writer=stream.writer)
+        time.sleep(seconds)
+        self.t.check(self.moving(), what)
+        return stream
+
+    def refuses(self, verb, part, what, **options):
+        """Checks that the call of the service is refused, with these words in its reason."""
+        answer = self.peer.call(f"iwheel/{verb}", **options)
+        self.t.check(answer and not answer[0] and part in answer[1], f"{what}: {answer}")
+
     def moving(self, since_us=None):
         return any(speed for _, _, speed in self.rig.bus.setpoints(since_us or now_us() - 200_000))
 
@@ -221,6 +232,10 @@ class Ride:
     def silence(self):
         """Waits until the gateway listens again: the judge needs the end of each session."""
         self.t.check(self.rig.wait_status(self.client, lambda s: s["state"] == "listening", 6), "silence")
+
+    def judge_at_rest(self):
+        self.silence()
+        self.t.judge(self.rig)
 
 
 __all__ = ["Ride", "Stream", "now_us", "wait_connect"]

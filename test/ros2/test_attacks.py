@@ -31,13 +31,14 @@ for _ in range(30):
 """
 
 
-def restart_bridge(ride):
-    """Restarts the bridge, so that it knows no writer; returns its ports."""
+def restart_bridge(ride, ports):
+    """Restarts the bridge, so that it knows no writer; on the same ports."""
     ride.bridge.end()
     ride.state.take()
     ride.start_bridge()
     ride.t.check(ride.await_state(lambda s: s["gateway"] == "up"), "the bridge is up again")
-    return ports_of(ride.bridge.child.pid)
+    again = ports_of(ride.bridge.child.pid)
+    ride.t.check(again == ports, f"the same ports: {ports}, {again}")
 
 
 def old(seconds):
@@ -47,8 +48,7 @@ def old(seconds):
 @scenario("a writer's first sample of 60 s ago does nothing: cmd_vel, arm, reset", 20)
 def old_first_samples(t):
     ride = Ride(t, {"drive": {"allow_reset": "yes"}})
-    late = ride.peer.call("iwheel/arm", at_ns=old(60))
-    t.check(late and not late[0] and "too late" in late[1], f"arm: {late}")
+    ride.refuses("arm", "too late", "arm", at_ns=old(60))
     t.rule(ride.client.request("status")["state"] == "listening", "no writer has armed")
     topic, writers = ride.commands().writer.topic, []
     ride.arm()
@@ -63,8 +63,7 @@ def old_first_samples(t):
     ride.silence()
     ride.peer.call("iwheel/estop")
     time.sleep(3)
-    late = ride.peer.call("iwheel/reset", at_ns=old(60))
-    t.check(late and not late[0] and "too late" in late[1], f"reset: {late}")
+    ride.refuses("reset", "too late", "reset", at_ns=old(60))
     t.rule(ride.client.request("status")["state"] == "latched", "the latch is closed")
     answer = ride.peer.call("iwheel/reset")
     t.check(answer and answer[0], f"reset of now: {answer}")
@@ -95,8 +94,7 @@ def held_back_bursts(t):
 def writers_of_a_network(t):
     ride = Ride(t, {"ros": {"network": "default"}})
     writer = ride.commands()
-    answer = ride.peer.call("iwheel/arm")
-    t.check(answer and not answer[0] and "clocks = synchronised" in answer[1], f"arm: {answer}")
+    ride.refuses("arm", "clocks = synchronised", "arm")
     stream = Stream(writer, lambda: (ride.peer.twist(0.3), old(-3600)), 0.05)
     time.sleep(0.8)
     t.check(not ride.tap.twists, f"no command of an unknown writer passes: {ride.tap.twists[:3]}")
@@ -128,8 +126,7 @@ def undecodable_requests(t):
     t.first_after(ride.rig, t_us, lambda speed: speed < 300, "the ramp begins", 200)  # A bridge may take 200 ms.
     stream.stop()
     t.stopped_by(ride.client, "client_stop", "stopping")
-    ride.silence()
-    t.judge(ride.rig)
+    ride.judge_at_rest()
 
 
 @scenario("two people publish cmd_vel: the first one that drives after arm has the wheels, until a stop", 30)
@@ -146,20 +143,17 @@ def one_person_of_two_publishers(t):
     t.check(ride.await_diagnosis("cmd_vel", "2 publishers", 3) == 1, "reported")
     mine.stop()
     ride.silence()
-    refused = ride.peer.call("iwheel/arm")
-    t.check(refused and not refused[0] and "not zero" in refused[1], f"arm during the second one's stream is refused: {refused}")
+    ride.refuses("arm", "not zero", "arm during the second one's stream is refused")
     yours.stop()
     time.sleep(0.6)
     ride.arm()
     yours = ride.stream(-0.2, writer=second)
     time.sleep(0.5)
     t.check(ride.moving() and [v for _, v, _ in ride.tap.twists if v < 0], "now the second one drives")
-    refused = ride.peer.call("iwheel/arm")
-    t.check(refused and not refused[0], f"and it has the wheels: {refused}")
+    ride.refuses("arm", "", "and it has the wheels")
     t.check(ride.peer.call("iwheel/stop") == (True, ""), "every client can stop it")
     yours.stop()
-    ride.silence()
-    t.judge(ride.rig)
+    ride.judge_at_rest()
 
 
 @scenario("loopback: another machine that sends a local driver's packets moves nothing", 30)
@@ -175,21 +169,18 @@ def other_machine(t):
         path = ride.rig.path("packets")
         ride.silence()
         time.sleep(0.6)
-        again = restart_bridge(ride)
-        t.check(again == ports, f"the same ports: {ports}, {again}")
+        restart_bridge(ride, ports)
         count = len(ride.tap.twists)
         send_again(cable, packets, path, HERE_ADDRESS)
         t.rule(len(ride.tap.twists) == count and not ride.moving(now_us() - 4_000_000), f"another machine drives: {len(ride.tap.twists) - count} commands")
         t.check(ride.client.request("status")["state"] == "listening", "no writer has armed")
         # The same packets drive where they may: they are valid.
-        again = restart_bridge(ride)
-        t.check(again == ports, f"the same ports: {ports}, {again}")
+        restart_bridge(ride, ports)
         send_again(None, packets, path, "127.0.0.1")
         passed = len(ride.tap.twists) - count
         t.check(passed >= 20 and ride.moving(now_us() - 1_500_000), f"sent on this machine they drive: {passed} commands")
         ride.silence()
-        again = restart_bridge(ride)
-        t.check(again == ports, f"the same ports: {ports}, {again}")
+        restart_bridge(ride, ports)
         count = len(ride.tap.twists)
         send_again(None, timeless(packets), path, "127.0.0.1")
         t.rule(len(ride.tap.twists) == count and ride.client.request("status")["state"] == "listening", "a packet without a time stamp drives")
@@ -231,8 +222,7 @@ def announced_crowd(t):
         finally:
             child.kill()
     stream.stop()
-    ride.silence()
-    t.judge(ride.rig)
+    ride.judge_at_rest()
 
 
 @scenario("20,000 undecodable samples, and texts of 60 kB: the log and the memory are bounded, a publisher drives", 40)
@@ -256,5 +246,4 @@ def garbage_at_1_khz(t):
     t.figure(f"{len(text)} bytes of log, {size_kB} kB")
     stream = ride.driving()
     stream.stop()
-    ride.silence()
-    t.judge(ride.rig)
+    ride.judge_at_rest()

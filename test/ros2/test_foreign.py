@@ -7,7 +7,7 @@ import shutil
 import subprocess
 import time
 
-from jazzy import Jazzy
+from jazzy import Jazzy, compiled
 from ride import Ride, now_us
 from scenario import Skip, scenario
 
@@ -15,19 +15,11 @@ HERE = os.path.dirname(os.path.abspath(__file__))
 
 
 def fast_peer(t):
-    """The path of the program, compiled at the first use."""
+    """The path of the program."""
     if not os.path.exists("/usr/include/fastdds/dds/domain/DomainParticipant.hpp") or shutil.which("c++") is None:
         raise Skip("libfastrtps-dev or g++ is missing (scripts/install_tools check brings it)")
-    program = os.path.join(os.path.abspath(t.build), "fast_peer")
-    source = os.path.join(HERE, "fast_peer.cpp")
-    if not os.path.exists(program) or os.path.getmtime(program) < os.path.getmtime(source):
-        library = "fastrtps" if os.path.exists("/usr/include/fastrtps") else "fastdds"  # Version 2 or 3.
-        own = f"{program}.{os.getpid()}"  # Another scenario may compile it in parallel.
-        command = ["c++", "-std=c++17", "-O0", "-o", own, source, f"-l{library}", "-lfastcdr"]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=100, check=False)
-        t.check(done.returncode == 0, f"it does not compile: {done.stderr[-600:]}")
-        os.replace(own, program)
-    return program
+    library = "fastrtps" if os.path.exists("/usr/include/fastrtps") else "fastdds"  # Version 2 or 3.
+    return compiled(t, "fast_peer", [os.path.join(HERE, "fast_peer.cpp")], "-O0", f"-l{library}", "-lfastcdr")
 
 
 def run_fast(ride, program, *words):
@@ -45,8 +37,7 @@ def fast_dds(t):
     t.check(odom and float(odom[1]) > 0.2 and abs(float(odom[2]) - 0.3) < 0.1, f"it receives the odometry: {output[-300:]}")
     t.check(len(ride.tap.twists) >= 25, f"{len(ride.tap.twists)} of 30 commands")
     t.figure(f"{len(ride.tap.twists)} of 30 commands, {odom[0] if odom else 'no odometry'}")
-    ride.silence()
-    t.judge(ride.rig)
+    ride.judge_at_rest()
 
 
 @scenario("Fast DDS calls the services: arm gets a reply, stop and estop stop, each call by a new client", 40)
@@ -158,8 +149,7 @@ def clients_come_and_go(t):
     t.check(all(speed for _, _, speed in ride.rig.bus.setpoints(begin_us)), "without a stop")
     t.figure(f"{(now_us() - begin_us) / 1e6:.1f} s of driving")
     stream.stop()
-    ride.silence()
-    t.judge(ride.rig)
+    ride.judge_at_rest()
 
 
 @scenario("ROS 2 Jazzy, its default vendor: a call of iwheel/estop stops within 200 ms; all services reply", 40)

@@ -8,7 +8,7 @@ import subprocess
 import time
 
 from bus import now_us
-from jazzy import ROOT
+from jazzy import ROOT, compiled
 from judge_log import Event
 from scenario import Skip, scenario
 
@@ -21,16 +21,10 @@ PATIENT = {"limits": {"wheel_silent_ms": 200, "echo_ms": 200}}
 def program(t):
     if shutil.which("c++") is None:
         raise Skip("g++ is missing")
-    made, own = os.path.join(os.path.abspath(t.build), "hardware_peer"), os.path.join(os.path.abspath(t.build), f"hardware_peer.{os.getpid()}")
     sources = [os.path.join(PACKAGE, "src", "drive.cpp"), os.path.join(HERE, "hardware_peer.cpp")]
-    newest = max(os.path.getmtime(path) for path in (*sources, os.path.join(PACKAGE, "include", "iwheel_hardware", "drive.hpp")))
-    if not os.path.exists(made) or os.path.getmtime(made) < newest:
-        folders = [f"-I{PACKAGE}/include", f"-I{ROOT}/lib/client/include"]
-        command = ["c++", "-std=c++17", "-Wall", "-Wextra", "-Werror", *folders, "-o", own, *sources, f"{t.build}/lib/client/libiwheel-client.a"]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=100, check=False)
-        t.check(done.returncode == 0, f"it does not compile: {done.stderr[-800:]}")
-        os.replace(own, made)
-    return made
+    header = os.path.join(PACKAGE, "include", "iwheel_hardware", "drive.hpp")
+    folders = [f"-I{PACKAGE}/include", f"-I{ROOT}/lib/client/include"]
+    return compiled(t, "hardware_peer", sources, "-Wall", "-Wextra", "-Werror", *folders, f"{t.build}/lib/client/libiwheel-client.a", newer=[header])
 
 
 class Hardware:

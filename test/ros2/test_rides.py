@@ -13,6 +13,8 @@ from judge_log import Event
 from peer import DataWriter, Reader, quality
 from ride import Ride, Stream
 from scenario import Skip, scenario
+from settings_file import write_settings
+from trials import until
 
 SEEN_MS = 200  # a stop is visible within this
 MESSAGES = {
@@ -66,8 +68,7 @@ def messages(t):
     t.check(all(map(math.isfinite, parts)), f"RViz drops a wrench with a part that is no number: {wrench}")
     seconds = readers["odom"].all[-1][2] - readers["odom"].all[0][2]
     t.figure(f"{len(readers['odom'].all)} odom, {sum(len(r.all) for r in readers.values())} messages compared, {seconds:.1f} s")
-    ride.silence()
-    t.judge(ride.rig)
+    ride.judge_at_rest()
 
 
 @scenario("the odometry is at the position that the wheels have reached", 12)
@@ -143,22 +144,18 @@ def services(t):
     t.figure(f"ramp after {ms or 0:.0f} ms")
     ride.silence()
     t.check(ride.still(), "the stream continues, the wheels stay at standstill")
-    refused = ride.peer.call("iwheel/arm")
-    t.check(refused and not refused[0] and "drive" in refused[1], f"arm during a stream is refused: {refused}")
+    ride.refuses("arm", "drive", "arm during a stream is refused")
     stream.stop()
     time.sleep(0.6)
     ride.arm()
     stream = ride.stream(0.3, writer=stream.writer)
     time.sleep(0.5)
     t.check(ride.peer.call("iwheel/estop") == (True, ""), "estop")
-    refused = ride.peer.call("iwheel/arm")
-    t.check(refused and not refused[0] and "let go of the stick" in refused[1], f"the stream continues: {refused}")
+    ride.refuses("arm", "let go of the stick", "the stream continues")
     stream.stop()
     time.sleep(0.6)
-    refused = ride.peer.call("iwheel/arm")
-    t.check(refused and not refused[0] and "reset" in refused[1], f"latched: {refused}")
-    refused = ride.peer.call("iwheel/reset")
-    t.check(refused and not refused[0] and "allow_reset" in refused[1], f"reset over the network is refused: {refused}")
+    ride.refuses("arm", "reset", "latched")
+    ride.refuses("reset", "allow_reset", "reset over the network is refused")
     ask, answer = ride.peer.writer("iwheel/ask", "std_msgs/msg/String"), ride.peer.reader("iwheel/answer", "std_msgs/msg/String")
     ask.await_match()
     ask.write(ride.peer.make("std_msgs/msg/String", data="arm"))
@@ -167,8 +164,7 @@ def services(t):
     ask.write(ride.peer.make("std_msgs/msg/String", data="stop"))
     words = answer.wait(seconds=2)
     t.check(words and words.data == "stop: done", f"by topic: {words}")
-    late = ride.peer.call("iwheel/arm", at_ns=time.time_ns() - 10**9)
-    t.check(late and not late[0] and "too late" in late[1], f"an old request to arm is refused: {late}")
+    ride.refuses("arm", "too late", "an old request to arm is refused", at_ns=time.time_ns() - 10**9)
     t.judge(ride.rig)
 
 
@@ -215,8 +211,7 @@ def hostile_publishers(t):
     t.check(not ride.moving(now_us() - 100_000), "the wheels have stopped meanwhile")
     t.check(ride.bridge.resident_kB() < 40_000, f"{ride.bridge.resident_kB()} kB")
     t.figure(f"{count} of about 1500 passed on, {ride.bridge.resident_kB()} kB")
-    ride.silence()
-    t.judge(ride.rig)
+    ride.judge_at_rest()
 
 
 DYING = """
@@ -241,11 +236,8 @@ def publisher_dies(t):
     publisher = Process([sys.executable, "-c", DYING, str(ride.domain), here, here], ride.rig.path("publisher.out"))
     ride.rig.processes.append(publisher)
     # The stream begins before an arm: it is refused, as a stream during a reset is.
-    end = time.monotonic() + 10
-    while not ride.tap.twists and time.monotonic() < end:
-        time.sleep(0.01)
-    refused = ride.peer.call("iwheel/arm")
-    t.check(refused and not refused[0], f"an earlier stream does not drive: {refused}")
+    until(lambda: ride.tap.twists)
+    ride.refuses("arm", "", "an earlier stream does not drive")
     t.check(ride.await_diagnosis("cmd_vel", "refused", 3) == 1, "the reason for ignored commands is reported")
     publisher.signal(signal.SIGSTOP)
     time.sleep(0.7)
@@ -259,8 +251,7 @@ def publisher_dies(t):
     ms = t.first_after(ride.rig, killed_us, lambda speed: speed == 0, "zero", 200 + 20 + 200 + 80)
     t.figure(f"zero after {ms or 0:.0f} ms")
     t.stopped_by(ride.client, "lease_lost", "stopping")
-    ride.silence()
-    t.judge(ride.rig)
+    ride.judge_at_rest()
 
 
 @scenario("its source sends nothing for longer than timeout_ms: the bridge stops, once", 8)
@@ -273,8 +264,7 @@ def source_silent(t):
     stops = [event for event in ride.rig.timeline if event.kind == "stop" and event.t_us > t_us]
     t.check(len(stops) == 1 and stops[0].t_us - t_us < 220_000, f"{[(e.t_us - t_us) / 1000 for e in stops]}")
     t.stopped_by(ride.client, "client_stop", "stopping")
-    ride.silence()
-    t.judge(ride.rig)
+    ride.judge_at_rest()
 
 
 @scenario("e-stop, lost lease, lost bus, lost gateway: seen within 0.2 s, each with its sentence; nothing starts on its own", 25)
@@ -339,9 +329,7 @@ def stops_are_seen(t):
     stream.stop()
     ride.silence()
     ride.arm()
-    stream = ride.stream(0.2, writer=stream.writer)
-    time.sleep(0.5)
-    t.check(ride.moving(), "armed again, it drives again")
+    stream = ride.resumes(stream, 0.5, "armed again, it drives again", v=0.2)
     stream.stop()
     ride.silence()
     t.figure(", ".join(figures))
@@ -436,8 +424,7 @@ def bridge_killed(t):
     t.check(ride.await_state(lambda s: s["gateway"] == "up"), "the new bridge is up")
     t.check(ride.still(0.8), "the stream continues, the wheels stay at standstill")
     stream.stop()
-    ride.silence()
-    t.judge(ride.rig)
+    ride.judge_at_rest()
 
 
 @scenario("bridge frozen while driving: the lease stops the wheels; thawed, it sends nothing old", 10)
@@ -452,8 +439,7 @@ def bridge_frozen(t):
     ride.bridge.signal(signal.SIGCONT)
     t.check(ride.still(0.6), "thawed, its commands are refused")
     stream.stop()
-    ride.silence()
-    t.judge(ride.rig)
+    ride.judge_at_rest()
 
 
 @scenario("bridge ended by SIGTERM while driving: stops the wheels, exits with 0", 8)
@@ -464,8 +450,7 @@ def bridge_ends(t):
     t.check(ride.bridge.wait(3) == 0, f"exit code: {ride.bridge.text()[-300:]}")
     stream.stop()
     t.stopped_by(ride.client, "client_stop", "stopping")
-    ride.silence()
-    t.judge(ride.rig)
+    ride.judge_at_rest()
 
 
 @scenario("auto_arm: only after standstill, and not after a stop of another cause", 16)
@@ -478,9 +463,7 @@ def auto_arm(t):
     stream.stop()
     ride.silence()
     time.sleep(0.6)
-    stream = ride.stream(0.3, writer=stream.writer)
-    time.sleep(0.8)
-    t.check(ride.moving(), "after its own pause too")
+    stream = ride.resumes(stream, 0.8, "after its own pause too")
     stream.stop()
     ride.silence()
     t.check(ride.peer.call("iwheel/stop") == (True, ""), "a person stops a machine at standstill")
@@ -489,9 +472,7 @@ def auto_arm(t):
     t.rule(ride.still(1.5), "the next stream arms")
     stream.stop()
     time.sleep(1.2)
-    stream = ride.stream(0.3, writer=stream.writer)
-    time.sleep(0.8)
-    t.check(ride.moving(), "after a pause of the source it arms again")
+    stream = ride.resumes(stream, 0.8, "after a pause of the source it arms again")
     ride.rig.press()
     ride.rig.release()
     stream.stop()
@@ -502,20 +483,16 @@ def auto_arm(t):
     stream.stop()
     time.sleep(0.6)
     ride.arm()
-    stream = ride.stream(0.3, writer=stream.writer)
-    time.sleep(0.5)
-    t.check(ride.moving(), "after the service call it drives")
+    stream = ride.resumes(stream, 0.5, "after the service call it drives")
     stream.stop()
-    ride.silence()
-    t.judge(ride.rig)
+    ride.judge_at_rest()
 
 
 @scenario("current_role = setpoint: driving is refused with its sentence, watching works", 8)
 def setpoint_role(t):
     ride = Ride(t, config={"wheels": {"current_role": "setpoint"}})
     odom = ride.peer.reader("odom", "nav_msgs/msg/Odometry")
-    answer = ride.peer.call("iwheel/arm")
-    t.check(answer and not answer[0] and "carries no current" in answer[1], f"arm: {answer}")
+    ride.refuses("arm", "carries no current", "arm")
     stream = ride.stream(0.3)
     t.check(ride.still(0.4) and not ride.tap.twists, "no command is passed on")
     stream.stop()
@@ -550,8 +527,7 @@ def names(t):
             time.sleep(0.4)
             stream.stop()
             t.check(not [v for _, v, _ in ride.tap.twists if v == 200], "a command with a stamp of a second ago is dropped")
-            ride.silence()
-            t.judge(ride.rig)
+            ride.judge_at_rest()
         ride.bridge.end()
 
 
@@ -582,8 +558,8 @@ def starts(t):
     code, text = call("-c", ride.conf)
     t.check(code == 78 and f"{ride.conf}:" in text and "unknown key autoarm" in text, f"{code} {text}")
     if os.geteuid() == 0:
-        with open(ride.rig.path("driving.conf"), "w", encoding="utf-8") as file:
-            file.write(f"[gateway]\nsocket = {ride.rig.path('gateway.sock')}\n[ros]\nnetwork = loopback\ndomain = {ride.domain}\n")
+        settings = {"gateway": {"socket": ride.rig.path("gateway.sock")}, "ros": {"network": "loopback", "domain": ride.domain}}
+        write_settings(ride.rig.path("driving.conf"), settings)
         for path in (ride.rig.folder, os.path.dirname(ride.rig.folder)):
             os.chmod(path, 0o755)
         os.chmod(ride.rig.path("driving.conf"), 0o644)

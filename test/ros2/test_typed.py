@@ -16,11 +16,11 @@ from harness import Process
 from jazzy import ROOT, Jazzy, finish
 from ride import Ride, now_us
 from scenario import Skip, scenario
+from trials import until
 
 # `t.rule` in a scenario without time limits: a stall of the machine does not explain a failure there.
 SEEN_S = 12  # Limit from a typed command to its effect: Python starts, and DDS discovers.
 TRIGGER = "std_srvs/srv/Trigger"
-STAND_IN = "typed.py"  # Only this program prints when it sent the request.
 
 
 def rows():
@@ -220,9 +220,7 @@ def typed_drive(t):
     for command in DRIVES:
         typed.drives(command)
     child = typed.jazzy.start(DRIVES[0].replace("--for 2", "--for 9"))
-    end = time.monotonic() + SEEN_S
-    while not typed.ride.moving() and time.monotonic() < end:
-        time.sleep(0.05)
+    until(typed.ride.moving, SEEN_S, "it drives")
     finish(child)
     t.check(child.returncode == 130, f"Ctrl-C: {child.returncode}")
     time.sleep(0.6)
@@ -416,8 +414,7 @@ def gamepad_node(t):
     seconds = (moved[-1] - silent_us) / 1e6 if moved else 0.0
     t.check(1.5 < seconds < 2.8, f"the wheels turned for {seconds:.1f} s after the last report", True, now_us())
     t.figure(f"{seconds:.1f} s after the last report")
-    ride.silence()
-    t.judge(ride.rig)
+    ride.judge_at_rest()
 
 
 @scenario("the description: xacro makes a URDF of two wheels with the names of joint_states and of the wrenches", 3)
