@@ -50,6 +50,12 @@ class WithRig(unittest.TestCase):
     def ctl(self, *words):
         return ctl.run("--socket", self.rig.path("gateway.sock"), *words)
 
+    def good(self, *words):
+        """The output; with success and without a message."""
+        code, out, err = self.ctl(*words)
+        self.assertEqual((0, ""), (code, err))
+        return out
+
     def drive(self, seconds, left=300, right=200):
         self.assertTrue(self.client.request("arm", name="tester")["ok"])
         stream = Streamer(self.client, left, right, 0.05)
@@ -92,8 +98,7 @@ class BlackBox(WithRig):
     def test_latched_stop_recording_replays_byte_for_byte(self):
         stem = self.stop_by_button()
         self.assertTrue(stem.endswith("stop-000001-estop_line"))
-        code, out, err = self.ctl("replay", stem + ".log")
-        self.assertEqual((0, ""), (code, err))
+        out = self.good("replay", stem + ".log")
         self.assertIn("estop_line: e-stop", out)
         self.assertIn("pressed while driving 300/200 mm/s", out)
         for what in ("setpoints on the bus", "answers to requests", "changes of state", "stops"):
@@ -112,8 +117,7 @@ class BlackBox(WithRig):
         time.sleep(1.2)  # Written again, for a recording that begins in the middle.
         self.assertTrue(self.client.request("confirm", item="mount_sign_left")["ok"])
         stem = self.stop_by_button()
-        code, out, err = self.ctl("replay", stem + ".log")
-        self.assertEqual((0, ""), (code, err))
+        out = self.good("replay", stem + ".log")
         self.assertRegex(out, r"arm +client \d+: denied\n")
         self.assertNotIn("DIFFERENT", out)
         entries = [json.loads(line) for line in read(stem + ".jsonl").splitlines() if '"type":"ledger"' in line]
@@ -130,13 +134,11 @@ class BlackBox(WithRig):
         self.assertGreaterEqual(after[0]["t_us"], why["at_us"])
         speeds = [frame["data"][2:6] for frame in before + after if frame["id"] == 266]
         self.assertEqual(("012C", "0000"), (speeds[0], speeds[-1]))
-        code, out, _ = self.ctl("why", "--frames", "40")
-        self.assertEqual(0, code)
+        out = self.good("why", "--frames", "40")
         self.assertIn(stem + ".log", out)
         self.assertIn("speed 300 mm/s", out.split("------ stop")[0])
         self.assertIn("speed 0 mm/s", out.split("------ stop")[1])
-        code, out, _ = self.ctl("why", "--list")
-        self.assertEqual(0, code)
+        out = self.good("why", "--list")
         self.assertIn("     1  ", out)
         self.assertIn("1 stop recorded in " + self.folder, out)
 
@@ -491,8 +493,7 @@ class Learn(WithRig):
         self.client.request("stop")
         child.wait(20)
         Path(path).write_text(read(path).replace(" T\n", "\n"), encoding="ascii")  # As if another controller had sent them.
-        code, out, err = self.ctl("learn", path)
-        self.assertEqual((0, ""), (code, err))
+        out = self.good("learn", path)
         for part in (
             "+ setpoint type 9 moves the wheels",
             "always 8 bytes",

@@ -448,6 +448,11 @@ class Replay(unittest.TestCase):
     def replay(self, *words, name="estop.log"):
         return run("replay", name, *words, cwd=self.folder)
 
+    def replayed(self, *words, **more):
+        code, out, err = self.replay(*words, **more)
+        self.assertEqual(0, code, err)
+        return out
+
     def change(self, ending, change):
         path = Path(self.folder, f"estop.{ending}")
         path.write_text(change(path.read_text(encoding="utf-8")), encoding="utf-8")
@@ -460,8 +465,7 @@ class Replay(unittest.TestCase):
 
     def test_other_configuration_shows_as_other_setpoints(self):
         self.change("conf", lambda text: text.replace("accel_mm_s2 = 800", "accel_mm_s2 = 400"))
-        code, out, _ = self.replay()
-        self.assertEqual(0, code)
+        out = self.replayed()
         same, of = (int(out.split("setpoints on the bus: ")[1].split()[i]) for i in (0, 2))
         self.assertLess(same, of)
 
@@ -484,8 +488,7 @@ class Replay(unittest.TestCase):
 
     def test_frames_alone_are_listened_to_with_a_configuration(self):
         os.remove(os.path.join(self.folder, "estop.jsonl"))
-        code, out, _ = self.replay()
-        self.assertEqual(0, code)
+        out = self.replayed()
         self.assertIn("frames only: no client arms", out)
         self.assertIn("listening, 0 stops", out)
         self.assertIn("left online", out)
@@ -496,8 +499,7 @@ class Replay(unittest.TestCase):
 
     def test_setpoints_of_another_controller_are_a_second_master(self):
         Path(self.folder, "other.log").write_text(lines("100#00000000", "120#00000000", "10A#0101F40064"), encoding="utf-8")
-        code, out, _ = self.replay("--config", "estop.conf", name="other.log")
-        self.assertEqual(0, code)
+        out = self.replayed("--config", "estop.conf", name="other.log")
         self.assertIn("fault      second_master", out)
 
     def test_cut_files_are_replayed_to_their_end_and_reported(self):
@@ -529,8 +531,7 @@ class Replay(unittest.TestCase):
 
     def test_long_silence_is_cut(self):
         Path(self.folder, "gap.log").write_text("(1.0) can0 100#00000000\n(601.0) can0 100#00000000\n(600.95) can0 100#00000000\n", encoding="utf-8")
-        code, out, _ = self.replay("--config", "estop.conf", name="gap.log")
-        self.assertEqual(0, code)
+        out = self.replayed("--config", "estop.conf", name="gap.log")
         self.assertIn("the gap is shortened to 60 s", out)
         self.assertIn("time goes back 1 times", out)
 
