@@ -229,12 +229,14 @@ class Ride:
             time.sleep(0.1)
         self.t.check(False, "reset")
 
-    def silence(self):
-        """Waits until the gateway listens again: the judge needs the end of each session."""
+    def silence(self, *streams):
+        """Ends these streams and waits until the gateway listens again: the judge needs the end of each session."""
+        for stream in streams:
+            stream.stop()
         self.t.check(self.rig.wait_status(self.client, lambda s: s["state"] == "listening", 6), "silence")
 
-    def judge_at_rest(self):
-        self.silence()
+    def judge_at_rest(self, *streams):
+        self.silence(*streams)
         self.t.judge(self.rig)
 
 

@@ -101,8 +101,7 @@ def writers_of_a_network(t):
     t.check(ride.await_diagnosis("cmd_vel", "not known yet", 2) == 1, "reported")
     time.sleep(0.8)
     t.check(ride.tap.twists, "an hour ahead, and known")
-    stream.stop()
-    ride.silence()
+    ride.silence(stream)
     t.judge(ride.rig, moves=False)
 
 
@@ -141,8 +140,7 @@ def one_person_of_two_publishers(t):
     t.rule(not [v for _, v, _ in ride.tap.twists if v < 0], "the second one's commands are passed on")
     t.check(ride.moving() and ride.client.request("status")["state"] == "armed", "the first one drives on")
     t.check(ride.await_diagnosis("cmd_vel", "2 publishers", 3) == 1, "reported")
-    mine.stop()
-    ride.silence()
+    ride.silence(mine)
     ride.refuses("arm", "not zero", "arm during the second one's stream is refused")
     yours.stop()
     time.sleep(0.6)
@@ -152,8 +150,7 @@ def one_person_of_two_publishers(t):
     t.check(ride.moving() and [v for _, v, _ in ride.tap.twists if v < 0], "now the second one drives")
     ride.refuses("arm", "", "and it has the wheels")
     t.check(ride.peer.call("iwheel/stop") == (True, ""), "every client can stop it")
-    yours.stop()
-    ride.judge_at_rest()
+    ride.judge_at_rest(yours)
 
 
 @scenario("loopback: another machine that sends a local driver's packets moves nothing", 30)
@@ -221,8 +218,7 @@ def announced_crowd(t):
             t.check(ride.peer.call("iwheel/stop") == (True, ""), "stop")
         finally:
             child.kill()
-    stream.stop()
-    ride.judge_at_rest()
+    ride.judge_at_rest(stream)
 
 
 @scenario("20,000 undecodable samples, and texts of 60 kB: the log and the memory are bounded, a publisher drives", 40)
@@ -245,5 +241,4 @@ def garbage_at_1_khz(t):
     t.rule(ride.client.request("status")["state"] == "listening", "no writer has armed")
     t.figure(f"{len(text)} bytes of log, {size_kB} kB")
     stream = ride.driving()
-    stream.stop()
-    ride.judge_at_rest()
+    ride.judge_at_rest(stream)

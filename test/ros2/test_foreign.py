@@ -148,8 +148,7 @@ def clients_come_and_go(t):
     t.check(ride.client.request("status")["state"] == "armed" and ride.moving(), "it drives on")
     t.check(all(speed for _, _, speed in ride.rig.bus.setpoints(begin_us)), "without a stop")
     t.figure(f"{(now_us() - begin_us) / 1e6:.1f} s of driving")
-    stream.stop()
-    ride.judge_at_rest()
+    ride.judge_at_rest(stream)
 
 
 @scenario("ROS 2 Jazzy, its default vendor: a call of iwheel/estop stops within 200 ms; all services reply", 40)
@@ -164,8 +163,7 @@ def jazzy_services(t):
     stream = ride.driving()
     (answer,) = jazzy.call(ride, "/iwheel/stop")
     t.check(answer["success"] is True, f"stop: {answer}")
-    stream.stop()
-    ride.silence()
+    ride.silence(stream)
     time.sleep(0.6)
     stream = ride.driving()
     (answer,) = jazzy.call(ride, "/iwheel/estop")

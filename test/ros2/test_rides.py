@@ -80,8 +80,7 @@ def odometry(t):
     for v, yaw, seconds in ((0.4, 0.0, 1.5), (0.2, 0.8, 1.5), (0.3, -0.4, 1.2)):
         stream = ride.stream(v, yaw, writer)
         time.sleep(seconds)
-        stream.stop()
-    ride.silence()
+        ride.silence(stream)
     time.sleep(0.2)
     odom.take()
     pose, status = odom.all[-1][1].pose.pose, ride.client.request("status")
@@ -326,12 +325,10 @@ def stops_are_seen(t):
     ride.restart_gateway(wheels=False, restart_hold=True)
     t.check(ride.await_state(lambda s: s["gateway"] == "up", 4), "the bridge finds it again")
     t.check(ride.still(0.6), "continued commands start nothing")
-    stream.stop()
-    ride.silence()
+    ride.silence(stream)
     ride.arm()
     stream = ride.resumes(stream, 0.5, "armed again, it drives again", v=0.2)
-    stream.stop()
-    ride.silence()
+    ride.silence(stream)
     t.figure(", ".join(figures))
     t.judge(ride.rig)
 
@@ -423,8 +420,7 @@ def bridge_killed(t):
     ride.start_bridge()
     t.check(ride.await_state(lambda s: s["gateway"] == "up"), "the new bridge is up")
     t.check(ride.still(0.8), "the stream continues, the wheels stay at standstill")
-    stream.stop()
-    ride.judge_at_rest()
+    ride.judge_at_rest(stream)
 
 
 @scenario("bridge frozen while driving: the lease stops the wheels; thawed, it sends nothing old", 10)
@@ -438,8 +434,7 @@ def bridge_frozen(t):
     t.figure(f"zero after {ms or 0:.0f} ms")
     ride.bridge.signal(signal.SIGCONT)
     t.check(ride.still(0.6), "thawed, its commands are refused")
-    stream.stop()
-    ride.judge_at_rest()
+    ride.judge_at_rest(stream)
 
 
 @scenario("bridge ended by SIGTERM while driving: stops the wheels, exits with 0", 8)
@@ -460,12 +455,10 @@ def auto_arm(t):
     stream = ride.stream(0.3)
     time.sleep(0.8)
     t.check(ride.moving(), "a command after a pause arms and drives")
-    stream.stop()
-    ride.silence()
+    ride.silence(stream)
     time.sleep(0.6)
     stream = ride.resumes(stream, 0.8, "after its own pause too")
-    stream.stop()
-    ride.silence()
+    ride.silence(stream)
     t.check(ride.peer.call("iwheel/stop") == (True, ""), "a person stops a machine at standstill")
     time.sleep(1.2)
     stream = ride.stream(0.3, writer=stream.writer)
@@ -484,8 +477,7 @@ def auto_arm(t):
     time.sleep(0.6)
     ride.arm()
     stream = ride.resumes(stream, 0.5, "after the service call it drives")
-    stream.stop()
-    ride.judge_at_rest()
+    ride.judge_at_rest(stream)
 
 
 @scenario("current_role = setpoint: driving is refused with its sentence, watching works", 8)
