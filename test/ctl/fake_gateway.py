@@ -14,7 +14,7 @@ HELLO = {"event": "hello", "name": "iwheel-gateway", "version": "0.1.0", "api": 
 
 def wheel(speed=0, applied=None, **more):
     """A wheel of a snapshot, everything known."""
-    values = {
+    return {
         "heard": True,
         "at_rest": speed == 0,
         "speed_rpm": speed // 20,
@@ -49,14 +49,13 @@ def wheel(speed=0, applied=None, **more):
         "valid": {},
         "saturated": {"battery": False, "force": False},
         "reboots": 0,
+        **more,
     }
-    values.update(more)
-    return values
 
 
 def snapshot(state="listening", **more):
     """A complete reply of status."""
-    values = {
+    return {
         "t_us": 1,
         "wall_us": 1,
         "version": "0.1.0",
@@ -81,9 +80,8 @@ def snapshot(state="listening", **more):
         "listen_only": False,
         "shutting_down": False,
         "warnings": [],
+        **more,
     }
-    values.update(more)
-    return values
 
 
 class FakeGateway:

@@ -19,6 +19,7 @@ from trials import until
 
 PROGRAM = program()
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+VERBS = ("status", "watch", "drive", "stop", "disarm", "estop", "reset", "release", "tare", "why", "ledger", "confirm", "doctor", "bringup", "top")
 NOT_ACKNOWLEDGED = {"ok": True, "number": 1, "cause": "send_stalled", "sentence": "setpoint not acknowledged", "at_us": 1}
 PUSHED = {"ok": False, "error": "not_at_rest", "message": "the wheels turn"}
 
@@ -580,11 +581,11 @@ class Asking(WithGateway):
 
     def test_unknown_verb_lists_the_known(self):
         err = self.ctl("fly")[2]
-        for verb in ("status", "watch", "drive", "stop", "disarm", "estop", "reset", "release", "tare", "why", "ledger", "confirm", "doctor", "bringup", "top"):
+        for verb in VERBS:
             self.assertIn(verb, err)
 
     def test_help_of_every_verb_needs_no_gateway(self):
-        for verb in ("status", "watch", "drive", "stop", "disarm", "estop", "reset", "release", "tare", "why", "ledger", "confirm", "doctor", "bringup", "top"):
+        for verb in VERBS:
             code, out, _ = run(verb, "--help")
             self.assertEqual(0, code)
             self.assertTrue(out.startswith("Usage: iwheelctl "), verb)

@@ -65,10 +65,6 @@ def stopped_ms(rig, **options):
     return braking_ms(rig, since)
 
 
-def assert_refused(answer, status, error):
-    assert answer[0] == status and answer[1]["error"] == error, answer
-
-
 def gateway_state(rig):
     client = rig.client(name="looker")
     try:
@@ -495,7 +491,8 @@ def test_bridge_before_the_gateway_waits_for_it(rig):
 def test_bridge_that_watches_cannot_drive_arm_or_reset(rig):
     rig.start().connected()
     for path in ("/api/arm", "/api/drive?v_mm_s=100", "/api/reset"):
-        assert_refused(rig.ask_json("POST", path), 403, "denied")
+        status, body = rig.ask_json("POST", path)
+        assert status == 403 and body["error"] == "denied", body
 
 
 @pytest.mark.rig(driving=True)
@@ -516,7 +513,8 @@ def test_page_drives_while_it_asks_and_no_longer(rig):
         (terms["key"], number + 1, -1_000_000, 150),
         (terms["key"], number + 1, 0, 301),
     ):
-        assert_refused(person.drive(key, sequence, age_us, v), 409, "dropped")
+        status, body = person.drive(key, sequence, age_us, v)
+        assert status == 409 and body["error"] == "dropped", body
     since = now_us()
     until(lambda: gateway_state(rig)["state"] in ("stopping", "listening"), 3, "the wheels stop without commands")
     assert braking_ms(rig, since) < 1000
