@@ -80,12 +80,16 @@ class Bringup(unittest.TestCase):
         self.killed = self.killed or operator.process.poll() is None
         operator.close()
 
-    def begin(self, *words, gear=False):
-        """Through the checks and the e-stop, and past the gear."""
+    def begin(self, *words, gear=False, to="type"):
+        """Through the checks and the e-stop, past the gear, and to the step about the type, role, signs or distance."""
         operator = self.start(*words)
         self.press_and_release(operator)
         if not gear:
             operator.answer("Turn the wheels by hand?", "n")
+        if to == "role":
+            self.find_type(operator)
+        elif to != "type":
+            self.drive_through(operator, signs=to == "distance")
         return operator
 
     def leave(self, operator, seconds=20.0):
@@ -420,8 +424,7 @@ class Bringup(unittest.TestCase):
         self.assertFalse(os.path.exists(self.out))
 
     def test_exchanged_wheels_end_it_with_the_fix(self):
-        operator = self.begin()
-        self.find_type(operator)
+        operator = self.begin(to="role")
         operator.answer("current_role", "limit")
         operator.answer("Watch the left wheel", "")
         operator.answer("r: repeat)", "o")
@@ -430,8 +433,7 @@ class Bringup(unittest.TestCase):
 
     def test_feedback_of_wrong_sign_ends_bringup_with_the_reason(self):
         self.rig.sim.ask("sign right swapped")
-        operator = self.begin()
-        self.find_type(operator)
+        operator = self.begin(to="role")
         operator.answer("current_role", "limit")
         operator.answer("Watch the left wheel", "")
         operator.answer("r: repeat)", "f")
@@ -486,8 +488,7 @@ class Bringup(unittest.TestCase):
 
     def test_existing_file_is_replaced_after_a_question_and_saved(self):
         Path(self.out).write_text("; precious\n", encoding="utf-8")
-        operator = self.begin()
-        self.find_type(operator)
+        operator = self.begin(to="role")
         operator.answer("current_role", "limit")
         self.look_at_signs_only(operator)
         operator.answer("Write it to", "")
@@ -547,8 +548,7 @@ class Bringup(unittest.TestCase):
     def test_type_that_turns_at_another_speed_is_not_confirmed(self):
         for command in ("gear both 2", "rpm both rotor"):
             self.rig.sim.ask(command)
-        operator = self.begin()
-        self.find_type(operator)
+        operator = self.begin(to="role")
         operator.expect("notes it as not confirmed")
         self.quit_at(operator, "current_role")
 
@@ -585,8 +585,7 @@ class Bringup(unittest.TestCase):
         self.assertEqual("setpoint", self.value("wheels", "current_role"))
 
     def test_straight_ahead_with_one_wheel_still_is_not_asked(self):
-        operator = self.begin()
-        self.drive_through(operator, signs=False)
+        operator = self.begin(to="signs")
         for side in ("left", "right"):
             operator.answer(f"Watch the {side} wheel", "")
             operator.answer("r: repeat)", "f")
@@ -596,15 +595,13 @@ class Bringup(unittest.TestCase):
         self.quit_at(operator, "Measure the force?")
 
     def test_wheel_that_turns_uncommanded_ends_the_signs(self):
-        operator = self.begin()
-        self.drive_through(operator, signs=False)
+        operator = self.begin(to="signs")
         self.answer_after("runaway right on 80", operator, "Watch the left wheel", "")
         operator.expect("BOTH wheels turned")
         self.leave(operator)
 
     def test_force_that_ends_sways_or_saturates_is_no_unit(self):
-        operator = self.begin()
-        self.drive_through(operator, signs=False)
+        operator = self.begin(to="signs")
         self.look_at_signs(operator, mirrored=())
         operator.answer("Measure the force?", "y")
         self.begin_to_weigh(operator, "left")
@@ -623,8 +620,7 @@ class Bringup(unittest.TestCase):
         self.quit_at(operator, "Distance in m")
 
     def test_radius_and_track_rest_on_gear_and_distance_and_say_so(self):
-        operator = self.begin()
-        self.drive_through(operator)
+        operator = self.begin(to="distance")
         self.push(operator, 3, 3, 3)
         operator.expect("if the gear is as configured: it was not measured")
         operator.answer("Use the mean?", "y")
@@ -651,8 +647,7 @@ class Bringup(unittest.TestCase):
         self.assertNotIn("confirm track", operator.text)
 
     def test_track_is_concluded_only_from_a_turn_on_the_spot(self):
-        operator = self.begin()
-        self.drive_through(operator)
+        operator = self.begin(to="distance")
         operator.answer("Distance in m", "")
         for turns, commands, expected in (
             (3, ("push both 2",), "rolled in the same direction"),
@@ -680,8 +675,7 @@ class Bringup(unittest.TestCase):
         os.kill(process_number, signal.SIGCONT)
 
     def test_track_is_concluded_though_the_computer_stalls(self):
-        operator = self.begin()
-        self.drive_through(operator)
+        operator = self.begin(to="distance")
         operator.answer("Distance in m", "")
         for gateway in (False, True):  # The wheels count on, and nothing of it is lost.
             self.begin_to_turn(operator)
@@ -725,8 +719,7 @@ class Bringup(unittest.TestCase):
 
     def save(self):
         """Ends after the role, with the results saved. Returns the path of the file."""
-        operator = self.begin()
-        self.drive_through(operator, signs=False)
+        operator = self.begin(to="signs")
         operator.answer("Watch the left wheel", "q")
         operator.answer("Save the 2 confirmed results", "")
         self.assertEqual(1, operator.wait())
@@ -790,8 +783,7 @@ class Bringup(unittest.TestCase):
         self.ends_soon(operator)
 
     def test_interrupt_at_question_or_force_reading_ends_bringup(self):
-        operator = self.begin()
-        self.drive_through(operator, signs=False)
+        operator = self.begin(to="signs")
         self.look_at_signs(operator, mirrored=())
         operator.answer("Measure the force?", "y")
         self.begin_to_weigh(operator, "left")
