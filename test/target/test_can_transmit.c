@@ -8,6 +8,14 @@ void setUp(void) {
     rig_start(0);
 }
 
+/// A frame is accepted, leaves, and has its echo, the only one.
+static void assert_sent(uint32_t id, uint8_t mark) {
+    TEST_ASSERT_EQUAL(1, rig_send(id, mark));
+    rig_assert_on_bus(id, mark);
+    rig_assert_echo(id, mark);
+    rig_assert_no_echo();
+}
+
 TEST(test_sent_frame_has_the_same_bytes) {
     const uint8_t bytes[8] = {0x81, 0x02, 0xF3, 0x04, 0x95, 0x06, 0xA7, 0x08};
     iw_can_frame_t frame = {.id = 0x7FF, .dlc = 8};
@@ -264,10 +272,7 @@ TEST(test_frame_that_never_ends_has_a_bounded_wait) {
     rig_serve(0);
     rig_assert_nothing_waits();
     rig_assert_no_echo();
-    TEST_ASSERT_EQUAL(1, rig_send(266, 3));
-    rig_assert_on_bus(266, 3);
-    rig_assert_echo(266, 3);
-    rig_assert_no_echo();
+    assert_sent(266, 3);
 }
 
 TEST(test_purge_that_does_not_end_resets_the_controller) {
@@ -281,10 +286,7 @@ TEST(test_purge_that_does_not_end_resets_the_controller) {
     join_again();
     rig_assert_nothing_waits();
     rig_assert_no_echo();
-    TEST_ASSERT_EQUAL(1, rig_send(266, 3));
-    rig_assert_on_bus(266, 3);
-    rig_assert_echo(266, 3);
-    rig_assert_no_echo();
+    assert_sent(266, 3);
 }
 
 /// The frame was sent and acknowledged, but the core has not read its echo yet when the other frame must be purged by
@@ -337,10 +339,7 @@ TEST(test_failed_attempts_before_an_abort_are_no_echo) {
 #endif
         TEST_ASSERT_EQUAL(1, can_purge(driver));
         rig_assert_no_echo();
-        TEST_ASSERT_EQUAL(1, rig_send(266, 2));
-        rig_assert_on_bus(266, 2);
-        rig_assert_echo(266, 2);
-        rig_assert_no_echo();
+        assert_sent(266, 2);
     }
 }
 
@@ -367,10 +366,7 @@ TEST(test_purge_aborts_all_frames) {
     TEST_ASSERT_EQUAL(1, can_purge(driver));
     rig_assert_nothing_waits();
     rig_assert_no_echo();
-    TEST_ASSERT_EQUAL(1, rig_send(266, 2));
-    rig_assert_on_bus(266, 2);
-    rig_assert_echo(266, 2);
-    rig_assert_no_echo();
+    assert_sent(266, 2);
 }
 
 TEST(test_echo_from_before_a_purge_is_dropped) {
@@ -395,10 +391,7 @@ TEST(test_frame_completed_during_a_purge_has_no_echo) {
     TEST_ASSERT_EQUAL(1, can_purge(driver));
     rig_assert_no_echo();
     rig_assert_nothing_waits();
-    (void)rig_send(266, 2);
-    rig_assert_on_bus(266, 2);
-    rig_assert_echo(266, 2);
-    rig_assert_no_echo();
+    assert_sent(266, 2);
 }
 
 static int mailbox_of(uint32_t id) {

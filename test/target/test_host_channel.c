@@ -74,22 +74,18 @@ TEST(test_command_within_a_long_lease_is_not_stale) {
     TEST_ASSERT_EQUAL_UINT32(0, refused);
 }
 
-static void run_until_listening(void) {
-    say(1, "{\"cmd\":\"stop\"}");
-    for (unsigned i = 0; i < 12U; i++) {
-        say(0, "{\"cmd\":\"alive\"}");
-        run_ms(200);
-    }
+static void disarm_silently(void) {
+    disarm();
     TEST_ASSERT_TRUE(brd_host_is_silent(&host));
 }
 
 TEST(test_flash_is_not_written_while_an_arm_waits) {
-    run_until_listening();
+    disarm_silently();
     say(0, "{\"cmd\":\"alive\"}");
     gateway_judge_renew(&rig.judge);
     say(1, "{\"cmd\":\"arm\"}"); // Both lines are in one batch: the gateway does not step between them.
     say(1, "{\"cmd\":\"config\",\"commit\":true,\"id\":5}");
-    all_length = 0;
+    forget();
     run_ms(20);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(all, "\"error\":\"denied\""), all);
     TEST_ASSERT_EQUAL_UINT64(0, host.restart_us);
@@ -107,10 +103,10 @@ TEST(test_channel_with_two_lines_executes_one_per_call) {
 }
 
 TEST(test_channel_that_only_watches_may_not_arm) {
-    run_until_listening();
+    disarm_silently();
     say(0, "{\"cmd\":\"open\",\"channel\":2,\"watch\":true}");
     say(2, "{\"cmd\":\"arm\",\"id\":9}");
-    all_length = 0;
+    forget();
     run_ms(60);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(all, "\"id\":9,\"ok\":false,\"error\":\"denied\""), all);
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_gateway_state(&rig.gateway));
@@ -142,10 +138,10 @@ static void assert_reported(const char *part) {
 
 TEST(test_pending_replies_leave_a_place_for_an_arm) {
     char part[64];
-    run_until_listening();
+    disarm_silently();
     say(0, "{\"cmd\":\"alive\"}");
     gateway_judge_renew(&rig.judge);
-    all_length = 0;
+    forget();
     say(1, "{\"cmd\":\"status\",\"id\":101}");
     ask_for_status(2, IWN_LINE_CHANNELS - 1U);
     say(1, "{\"cmd\":\"arm\",\"id\":99}");
@@ -159,7 +155,7 @@ TEST(test_pending_replies_leave_a_place_for_an_arm) {
 }
 
 TEST(test_pending_reply_of_a_closed_channel_frees_its_place) {
-    all_length = 0;
+    forget();
     ask_for_status(2, 3);
     say(0, "{\"cmd\":\"close\",\"channel\":3}");
     say(1, "{\"cmd\":\"status\",\"id\":7}");

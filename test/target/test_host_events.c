@@ -2,19 +2,6 @@
 // Events of the host code of the image: events, stops, zeros, stored values, and the commands of the relay.
 #include "host_rig.inc"
 
-/// Lets time pass with a connected relay.
-static void pass(uint32_t span_ms) {
-    for (uint32_t ms = 0; ms < span_ms; ms += 100U) {
-        say(0, "{\"cmd\":\"alive\"}");
-        run_ms(100);
-    }
-}
-
-static void forget(void) {
-    all[0] = '\0';
-    all_length = 0;
-}
-
 static unsigned count_of(const char *words) {
     unsigned count = 0;
     for (const char *at = strstr(all, words); at != NULL; at = strstr(at + 1, words)) {
@@ -27,12 +14,6 @@ static void watch_everything(void) {
     say(1, "{\"cmd\":\"watch\",\"topics\":[\"force\",\"stop\",\"bus\",\"estop\",\"lease\"],\"rate_hz\":1}");
     pass(100);
     forget();
-}
-
-static void disarm(void) {
-    say(1, "{\"cmd\":\"stop\"}");
-    pass(2500);
-    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_gateway_state(&rig.gateway));
 }
 
 TEST(test_host_reports_estop_and_each_cause_by_name_once) {
@@ -116,12 +97,9 @@ TEST(test_host_zero_of_each_wheel_is_reported_once_per_change) {
 }
 
 TEST(test_host_confirm_is_compared_with_the_value_in_use) {
-    say(0, "{\"cmd\":\"alive\"}");
-    assert_answer("{\"cmd\":\"confirm\",\"id\":1,\"item\":\"track\",\"value\":\"530\"}", "\"state\":\"confirmed\"");
-    say(0, "{\"cmd\":\"alive\"}");
-    assert_answer("{\"cmd\":\"confirm\",\"id\":2,\"item\":\"track\",\"value\":\"551\"}", "\"state\":\"contradicted\"");
-    say(0, "{\"cmd\":\"alive\"}");
-    assert_answer("{\"cmd\":\"confirm\",\"id\":3,\"item\":\"dlc\",\"value\":\"551\"}", "value must be yes or no");
+    ask("{\"cmd\":\"confirm\",\"id\":1,\"item\":\"track\",\"value\":\"530\"}", "\"state\":\"confirmed\"");
+    ask("{\"cmd\":\"confirm\",\"id\":2,\"item\":\"track\",\"value\":\"551\"}", "\"state\":\"contradicted\"");
+    ask("{\"cmd\":\"confirm\",\"id\":3,\"item\":\"dlc\",\"value\":\"551\"}", "value must be yes or no");
 }
 
 TEST(test_host_line_is_stamped_every_25_ms_while_armed) {

@@ -8,11 +8,16 @@ static uint32_t random_below(uint32_t limit) {
     return (uint32_t)((uint64_t)(chance >> 8) * limit >> 24);
 }
 
-static void drive_slowly(void) {
-    char line[IWN_LINE_BOARD_MAX];
-    gateway_judge_asked(&rig.judge, true); // The judge receives no requests: the test reports them to it.
+/// The judge receives no requests: the test reports them to it.
+static void note_drive(void) {
+    gateway_judge_asked(&rig.judge, true);
     gateway_judge_drive(&rig.judge, true);
-    put(line, drive_line(SLOW_MM_S, BOOT, ++seq, t_us, line));
+}
+
+static void drive_slowly(uint64_t stamp_us) {
+    char line[IWN_LINE_BOARD_MAX];
+    note_drive();
+    put(line, drive_line(SLOW_MM_S, BOOT, ++seq, stamp_us, line));
     has_used = true;
 }
 
@@ -99,7 +104,7 @@ TEST(test_host_line_of_a_million_hostile_lines_none_is_executed) {
         put("\n", 1);
         say(0, "{\"cmd\":\"alive\"}");
         if (turn % 64U < 32U) {
-            drive_slowly();
+            drive_slowly(t_us);
         }
         run_ms(20);
         if (turn % 64U == 63U) {
@@ -129,13 +134,10 @@ TEST(test_host_line_errors_are_reported_at_most_5_times_per_s) {
 
 /// The lease runs from the stamp that a command quotes, not from its receipt.
 TEST(test_host_line_lease_of_delayed_commands_runs_from_the_stamp) {
-    char line[IWN_LINE_BOARD_MAX];
     const uint64_t stamp_us = t_us;
     run_ms(150);
     say(0, "{\"cmd\":\"alive\"}");
-    gateway_judge_asked(&rig.judge, true);
-    gateway_judge_drive(&rig.judge, true);
-    put(line, drive_line(SLOW_MM_S, BOOT, ++seq, stamp_us, line));
+    drive_slowly(stamp_us);
     run_ms(40);
     TEST_ASSERT_EQUAL_UINT32(1, accepted);
     run_ms(35);
@@ -144,13 +146,10 @@ TEST(test_host_line_lease_of_delayed_commands_runs_from_the_stamp) {
 
 TEST(test_host_replies_have_the_id_and_the_result) {
     gateway_judge_renew(&rig.judge);
-    say(0, "{\"cmd\":\"alive\"}");
-    assert_answer("{\"cmd\":\"hello\",\"id\":1}", "\"name\":\"iwheel-gateway\"");
-    say(0, "{\"cmd\":\"alive\"}");
-    assert_answer("{\"cmd\":\"arm\",\"id\":2}", "\"id\":2,\"ok\":true");
+    ask("{\"cmd\":\"hello\",\"id\":1}", "\"name\":\"iwheel-gateway\"");
+    ask("{\"cmd\":\"arm\",\"id\":2}", "\"id\":2,\"ok\":true");
     assert_answer("{\"cmd\":\"config\",\"id\":3,\"key\":\"no.such\",\"value\":\"1\"}", "\"id\":3,\"ok\":false");
-    say(0, "{\"cmd\":\"alive\"}");
-    assert_answer("{\"cmd\":\"recordings\",\"id\":4}", "\"error\":\"denied\"");
+    ask("{\"cmd\":\"recordings\",\"id\":4}", "\"error\":\"denied\"");
     say(0, "{\"cmd\":\"link\"}");
     run_ms(10);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(last_line, "\"event\":\"link\",\"boot\":\"0123456789abcdef\","), last_line);
@@ -158,26 +157,13 @@ TEST(test_host_replies_have_the_id_and_the_result) {
 
 TEST(test_host_reply_to_arm_is_sent_when_armed) {
     say(0, "{\"cmd\":\"open\",\"channel\":2,\"watch\":false}");
-    say(1, "{\"cmd\":\"stop\"}");
-    for (unsigned i = 0; i < 10U; i++) {
-        say(0, "{\"cmd\":\"alive\"}");
-        run_ms(200);
-    }
-    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_gateway_state(&rig.gateway));
+    disarm();
     gateway_judge_renew(&rig.judge);
     answer[0] = '\0';
     say(1, "{\"cmd\":\"arm\",\"id\":7}");
     run_ms(60);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(answer, "\"id\":7,\"ok\":true"), answer);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(answer, "\"state\":\"armed\""), answer);
-}
-
-/// Maintains the link while time passes.
-static void wait_ms(uint32_t span_ms) {
-    for (uint32_t ms = 0; ms < span_ms; ms += 100U) {
-        say(0, "{\"cmd\":\"alive\"}");
-        run_ms(100);
-    }
 }
 
 static void assert_aged(const char *cmd, int64_t age_ms, const char *part) {
@@ -191,7 +177,7 @@ static void assert_aged(const char *cmd, int64_t age_ms, const char *part) {
 TEST(test_one_person_board_refuses_late_requests) {
     static const int64_t late_ms[] = {1100, 10000, 60000, -200};
     assert_answer("{\"cmd\":\"estop\",\"id\":1}", "\"ok\":true");
-    wait_ms(2500);
+    pass(2500);
     for (size_t i = 0; i < sizeof late_ms / sizeof late_ms[0]; i++) {
         assert_aged("reset", late_ms[i], "\"error\":\"stale_command\"");
         assert_aged("confirm", late_ms[i], "\"error\":\"stale_command\"");
@@ -209,9 +195,8 @@ TEST(test_one_person_board_refuses_late_requests) {
 
 TEST(test_one_person_board_reset_of_another_stop_is_refused) {
     assert_answer("{\"cmd\":\"estop\",\"id\":1}", "\"ok\":true");
-    wait_ms(2500);
-    say(0, "{\"cmd\":\"alive\"}");
-    assert_answer("{\"cmd\":\"reset\",\"id\":2,\"stop\":2}", "\"error\":\"stale_command\"");
+    pass(2500);
+    ask("{\"cmd\":\"reset\",\"id\":2,\"stop\":2}", "\"error\":\"stale_command\"");
     assert_answer("{\"cmd\":\"reset\",\"id\":3,\"stop\":0}", "\"error\":\"stale_command\"");
     say(0, "{\"cmd\":\"alive\"}");
     TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, iw_gateway_state(&rig.gateway));
@@ -233,7 +218,7 @@ TEST(test_one_person_board_refused_drive_makes_arm_stale) {
         const bool counts = i < 2U;
         gateway_judge_renew(&rig.judge);
         assert_answer("{\"cmd\":\"arm\",\"id\":7}", counts ? "\"error\":\"stale_command\"" : "\"ok\":true");
-        wait_ms(2500);
+        pass(2500);
         gateway_judge_renew(&rig.judge);
         assert_answer("{\"cmd\":\"arm\",\"id\":8}", "\"ok\":true");
     }
@@ -242,8 +227,7 @@ TEST(test_one_person_board_refused_drive_makes_arm_stale) {
 TEST(test_host_twist_turns_the_right_wheel_faster) {
     char line[IWN_LINE_BOARD_MAX];
     char json[256];
-    gateway_judge_asked(&rig.judge, true);
-    gateway_judge_drive(&rig.judge, true);
+    note_drive();
     (void)snprintf(json, sizeof json,
                    "{\"boot\":\"%016llx\",\"seq\":%llu,\"t_us\":%llu,\"cmd\":\"twist\",\"v_mm_s\":50,"
                    "\"yaw_mrad_s\":100}",
@@ -257,9 +241,6 @@ TEST(test_host_twist_turns_the_right_wheel_faster) {
 TEST(test_host_state_is_sent_at_its_rate) {
     say(1, "{\"cmd\":\"watch\",\"topics\":[\"state\"],\"rate_hz\":10}");
     states = 0;
-    for (unsigned i = 0; i < 10U; i++) {
-        say(0, "{\"cmd\":\"alive\"}");
-        run_ms(100);
-    }
+    pass(1000);
     TEST_ASSERT_UINT_WITHIN(3, 10, states);
 }

@@ -5,24 +5,6 @@
 
 #include "iwheel/codec.h"
 
-/// Lets time pass with a connected relay.
-static void pass(uint32_t span_ms) {
-    for (uint32_t ms = 0; ms < span_ms; ms += 100U) {
-        say(0, "{\"cmd\":\"alive\"}");
-        run_ms(100);
-    }
-}
-
-static void ask(const char *json, const char *part) {
-    say(0, "{\"cmd\":\"alive\"}");
-    assert_answer(json, part);
-}
-
-static void forget(void) {
-    all[0] = '\0';
-    all_length = 0;
-}
-
 static void watch(const char *topics) {
     char json[128];
     (void)snprintf(json, sizeof json, "{\"cmd\":\"watch\",\"topics\":[%s],\"rate_hz\":1}", topics);
