@@ -74,20 +74,7 @@ class Pair:
             f"[wheels]\nsetpoint_type = 1\ncurrent_role = limit\ntrack_mm = 540\n{TRACED}[northbound]\nmax_clients = 64\nmode = 0600\ngroup = {grp.getgrgid(os.getgid()).gr_name}\n[record]\n"
             f"directory = {self.folder}\n"
         )
-        self.simulator = subprocess.Popen(
-            [
-                self.build / "app/sim/iwheel-sim",
-                "--quiet",
-                "--uptime",
-                "120",
-                "--can",
-                f"unix:{self.folder}/bus",
-                "--estop",
-                f"{self.folder}/estop",
-                "--control",
-                f"{self.folder}/control",
-            ]
-        )
+        self.simulator = local.start_wheels(self.build, f"{self.folder}/")
         for name in ("bus", "estop"):  # A gateway that starts without its e-stop latches.
             self.await_file(name)
         self.gateway = self.start()

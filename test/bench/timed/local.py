@@ -25,26 +25,19 @@ def wait_for(path, within_s=10.0):
     time.sleep(0.1)
 
 
+def start_wheels(build, prefix):
+    """A simulator with its bus, e-stop and control socket at these paths."""
+    sockets = ["--can", f"unix:{prefix}bus", "--estop", f"{prefix}estop", "--control", f"{prefix}control"]
+    return subprocess.Popen([build / "app/sim/iwheel-sim", "--quiet", "--uptime", "120", *sockets])
+
+
 class Local:
     """`pair` is the benchmark's gateway and simulator; the floor runs on a separate bus with separate wheels."""
 
     def __init__(self, pair, tools):
         self.pair, self.tools = pair, Path(tools)
         self.bus = f"unix:{pair.folder}/floor-bus"
-        self.wheels = subprocess.Popen(
-            [
-                pair.build / "app/sim/iwheel-sim",
-                "--quiet",
-                "--uptime",
-                "120",
-                "--can",
-                self.bus,
-                "--estop",
-                f"{pair.folder}/floor-estop",
-                "--control",
-                f"{pair.folder}/floor-control",
-            ]
-        )
+        self.wheels = start_wheels(pair.build, f"{pair.folder}/floor-")
         wait_for(Path(self.bus[5:]))
 
     def end(self):

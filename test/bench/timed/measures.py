@@ -81,6 +81,18 @@ def as_a_hog():
     os.setpriority(os.PRIO_PROCESS, 0, 0)
 
 
+@contextlib.contextmanager
+def busy(command, count, setup=None):
+    """So many hogs meanwhile."""
+    hogs = [subprocess.Popen(["sh", "-c", command], preexec_fn=setup) for _ in range(count)]
+    try:
+        yield
+    finally:
+        for hog in hogs:
+            hog.kill()
+            hog.wait()
+
+
 class Measure:
     """Calls `turn(candidate)` for one candidate after the other, round after round."""
 
@@ -200,13 +212,8 @@ class FloodLoaded(Flood):
     hogs = 4
 
     def turn(self, candidate):
-        hogs = [subprocess.Popen(["sh", "-c", "while :; do :; done"]) for _ in range(self.hogs)]
-        try:
+        with busy("while :; do :; done", self.hogs):
             return super().turn(candidate)
-        finally:
-            for hog in hogs:
-                hog.kill()
-                hog.wait()
 
 
 class Pair(Measure):
@@ -229,17 +236,13 @@ class Pair(Measure):
         return {"gaps_ns": gaps}
 
     def drive(self, program):
-        with driven(self.around, program, renewal=Insistence):
-            hogs = [subprocess.Popen(["sh", "-c", WORK], preexec_fn=as_a_hog) for _ in range(self.hogs)]
+        with driven(self.around, program, renewal=Insistence), busy(WORK, self.hogs, as_a_hog):
             others = [self.around.tool("floor_receive", self.around.interface) for _ in range(self.receivers)]
             try:
                 return self.judge()
             finally:
                 for other in others:
                     other.end()
-                for hog in hogs:
-                    hog.kill()
-                    hog.wait()
 
     def before(self):
         return self.drive(self.plan["before"])
