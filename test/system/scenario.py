@@ -126,6 +126,10 @@ class Test(Findings):
         """Checks that the gateway listens within that time, so that it sends nothing any more."""
         return self.check(rig.wait_status(client, lambda s: s["state"] == "listening", seconds), text)
 
+    def stop_until_silent(self, rig, client):
+        client.request("stop")
+        self.silence(rig, client)
+
     def reset(self, client, seconds=6.0):
         """Repeats reset until the gateway accepts it. Returns the errors of the refusals."""
         reasons, end = [], time.monotonic() + seconds
@@ -162,6 +166,11 @@ class Test(Findings):
         elapsed_ms = (hit - t_us) / 1000
         self.check(elapsed_ms <= limit_ms, f"{text} after {elapsed_ms:.1f} ms, {limit_ms} ms allowed", True, hit, (elapsed_ms - limit_ms) * 1000)
         return elapsed_ms
+
+    def drive_and_judge(self, rig, client):
+        """At the end of a scenario: it drives again, or still."""
+        self.arm_and_drive(client, 200, 200, 0.5)
+        self.judge(rig)
 
     def judge(self, rig, moves=True, **options):
         judge = rig.judge(moves=moves, **options)

@@ -29,8 +29,7 @@ def slcan_nominal(t):
     t.check(abs(status["left"]["speed_mm_s"] - 400) < 40, f"left {status['left']['speed_mm_s']} mm/s")
     t.check(status["bus"]["echo"] == "unproven", f"echo {status['bus']['echo']}")
     t.check(stream.stop() is None, "the stream was not refused")
-    client.request("stop")
-    t.silence(rig, client)
+    t.stop_until_silent(rig, client)
     t.judge(rig)
 
 

@@ -67,8 +67,7 @@ def controller_nominal(t):
     status = client.request("status")
     t.check(abs(status["left"]["speed_mm_s"] - 400) < 40, f"left {status['left']['speed_mm_s']} mm/s")
     t.check(stream.stop() is None, "the stream was not refused")
-    client.request("stop")
-    t.silence(rig, client)
+    t.stop_until_silent(rig, client)
     t.judge(rig)
 
 

@@ -10,6 +10,7 @@ from catalogue import add, kernel_test
 from gpio_sim import Edges
 from kernel_rig import ESTOP_US, LEVEL_US, HighVcanRig, SlcanRig, TwoContactsRig, VcanRig, virtual
 from scenario import Skip
+from scenarios.estop import released_from_start
 
 PRESSES, PRESSES_HIGH, PRESSES_REAL_TIME, PRESSES_FULL = 100, 25, 25, 1000
 SERIES = 100  # presses of one gateway: its recording fits into a small machine
@@ -199,8 +200,7 @@ def row13_line_shorted(t):
     rig.second(False)
     expect_at(t, rig, client, "released", "neither")
     t.reset(client)
-    t.arm_and_drive(client, 200, 200, 0.5)
-    t.judge(rig)
+    t.drive_and_judge(rig, client)
 
 
 @kernel_test("one line under two names as both contacts: no start, and the message names the keys", "estop", 29, TwoContactsRig)
@@ -242,20 +242,8 @@ def row13_pressed_at_start(t):
     online = rig.wait_at_rest(client, 3)
     t.check(online and online["state"] == "latched", f"latched from the start: {online and online['state']}")
     t.stopped_by(client, "estop_line")
-    for _ in range(5):
-        t.expect(client.request("reset"), "estop_pressed")
-    rig.release()
-    time.sleep(1.5)
-    t.rule(client.request("status")["state"] == "latched", "release does not unlatch")
-    t.reset(client, 4.0)
-    for _ in range(5):
-        reply = client.request("reset")
-        t.check(reply["ok"] and reply["state"] == "listening", f"repeated reset: {reply}")
-    t.expect(client.drive(200, 200), "not_armed")
-    time.sleep(0.7)
-    t.rule(not rig.bus.setpoints(), "latched from listening and reset: nothing is sent")
-    t.arm_and_drive(client, 200, 200, 0.5)
-    t.judge(rig)
+    released_from_start(t, rig, client, 1.5, 0.7)
+    t.drive_and_judge(rig, client)
 
 
 def lost_chip(t, rig, client, after_s=0.6):
@@ -285,8 +273,7 @@ def row14_chip_vanishes(t):
     rig, client = t.running(SLOW)
     for after_s in (0.6, 0.603, 0.608, 0.612, 0.617):
         lost_chip(t, rig, client, after_s)
-        client.request("stop")
-        t.silence(rig, client)
+        t.stop_until_silent(rig, client)
     t.judge(rig)
 
 
@@ -310,8 +297,7 @@ def row14_no_chip_at_start(t):
     t.expect(client.request("reset"), "estop_pressed")
     rig.find_chip()
     t.reset(client)
-    t.arm_and_drive(client, 200, 200, 0.5)
-    t.judge(rig)
+    t.drive_and_judge(rig, client)
 
 
 @kernel_test("the line is busy at start: pressed; it is freed: reset", "estop", 14)
@@ -331,8 +317,7 @@ def row14_line_busy(t):
     holder.close()
     rig.release()
     t.reset(client)
-    t.arm_and_drive(client, 200, 200, 0.5)
-    t.judge(rig)
+    t.drive_and_judge(rig, client)
 
 
 @kernel_test("the line by chip and offset, and a name that does not exist", "estop", 14)
@@ -390,8 +375,7 @@ def row13_button_tried(t):
     rig.line = f"{rig.chip.chip}:{rig.chip.OFFSET}"
     client = started()
     t.check(untried(client), "its line has another configuration")
-    t.arm_and_drive(client, 200, 200, 0.5)
-    t.judge(rig)
+    t.drive_and_judge(rig, client)
 
 
 @kernel_test("an adapter without rights over the interface drives and stops as well", "estop", 11, SlcanRig)

@@ -96,11 +96,19 @@ def row27_disk_full(t):
             rig.release()
             t.reset(client)
             time.sleep(0.5)
-        t.arm_and_drive(client, 200, 200, 0.5)
-        t.judge(rig)
+        t.drive_and_judge(rig, client)
     finally:
         rig.gateway.end()
         subprocess.run(["umount", "-l", folder], check=True)
+
+
+def restarted(t, rig, killed_us):
+    """The gateway again, after a kill in motion: zeros first. Returns a client of it."""
+    observer = rig.connect_to_new(wheels=False, restart_hold=True, name="observer")
+    time.sleep(0.3)
+    sent = rig.bus.setpoints(killed_us + 20_000)
+    t.check(sent and not any(speed for _, _, speed in sent), f"zeros and nothing but zeros: {sent[:4]}")
+    return observer
 
 
 @kernel_test("processes of other users hold the names of the lock: the gateway starts, after a kill in motion too, and only once", "host", 30)
@@ -112,18 +120,14 @@ def row30_strangers(t):
     stream.stop()
     stranger = rig.stranger("listening", names[:1])
     rig.stranger("silent", names[1:])
-    observer = rig.connect_to_new(wheels=False, restart_hold=True, name="observer")
-    time.sleep(0.3)
-    sent = rig.bus.setpoints(killed_us + 20_000)
-    t.check(sent and not any(speed for _, _, speed in sent), f"zeros and nothing but zeros: {sent[:4]}")
+    observer = restarted(t, rig, killed_us)
     text = rig.gateway.text()
     t.check(f"process {stranger.child.pid} of user 65534 holds @{names[0]}" in text, f"who holds it: {text[:600]}")
     os.mkdir(rig.path("elsewhere"))
     other = rig.launch(rig.gateway_command("--socket", rig.path("elsewhere/gateway.sock")), "second.out")
     t.check(other.wait(5) == 69, f"a second gateway is refused: {other.text()[-300:]}")
     t.silence(rig, observer, text="listening after the hold")
-    t.arm_and_drive(observer, 200, 200, 0.4)
-    t.judge(rig)
+    t.drive_and_judge(rig, observer)
 
 
 @kernel_test("another user's gateway on the same interface ends when root's starts", "host", 30)
@@ -147,8 +151,7 @@ def row30_gives_way(t):
     again = rig.launch(command, "again.out", become_stranger)
     t.check(again.wait(5) == 69 and "another gateway already serves" in again.text(), f"nor starts: {again.text()[-300:]}")
     client = rig.client()
-    t.arm_and_drive(client, 200, 200, 0.4)
-    t.judge(rig)
+    t.drive_and_judge(rig, client)
 
 
 @kernel_test("the first gateway is killed: its interface is free again immediately", "host", 30)
@@ -156,8 +159,7 @@ def row30_after_a_crash(t):
     rig, _client = t.running()
     rig.kill_gateway(signal.SIGKILL)
     again = rig.connect_to_new()
-    t.arm_and_drive(again, 200, 200, 0.5)
-    t.judge(rig)
+    t.drive_and_judge(rig, again)
 
 
 @kernel_test("killed in motion; a gateway with its socket elsewhere finds the marker: zeros first", "host", 25)
@@ -168,15 +170,11 @@ def row25_marker_found_elsewhere(t):
     stream.stop()
     os.mkdir(rig.path("elsewhere"))
     rig.socket_name = "elsewhere/gateway.sock"
-    observer = rig.connect_to_new(wheels=False, restart_hold=True, name="observer")
-    time.sleep(0.3)
-    sent = rig.bus.setpoints(killed_us + 20_000)
-    t.check(sent and not any(speed for _, _, speed in sent), f"zeros and nothing but zeros: {sent[:4]}")
+    observer = restarted(t, rig, killed_us)
     t.check(observer.request("status")["cause"] == "restart", "the cause is the restart")
     t.silence(rig, observer, text="listening after the hold")
     t.arm_and_drive(observer, 200, 200, 0.4)
-    observer.request("stop")
-    t.silence(rig, observer)
+    t.stop_until_silent(rig, observer)
     rig.gateway.end()
     silent_us = now_us()
     rig.start_gateway()

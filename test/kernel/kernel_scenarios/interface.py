@@ -100,8 +100,7 @@ def row15_absent_at_start(t):
     rig.relisten()
     rig.sim = type(rig.sim)(rig)
     rig.wait_at_rest(client, 5)
-    t.arm_and_drive(client, 200, 200, 0.5)
-    t.judge(rig)
+    t.drive_and_judge(rig, client)
 
 
 @kernel_test("down while listening: an event, nothing sent, arm refused", "bus", 15)
@@ -119,8 +118,7 @@ def row15_down_while_listening(t):
     t.check(online, "back without reset")
     t.rule(not rig.bus.setpoints(), "nothing was sent")
     time.sleep(1.1)
-    t.arm_and_drive(client, 200, 200, 0.5)
-    t.judge(rig)
+    t.drive_and_judge(rig, client)
 
 
 @kernel_test("ENOBUFS for 300 ms in motion: stop, no old frame afterwards", "bus realtime", 17)
@@ -174,8 +172,7 @@ def row17_echo_proven(t):
     needs_echo(rig)
     t.check(client.request("status")["bus"]["echo"] == "proven", "status: echo proven")
     t.arm_and_drive(client, 300, 300, 1.0)
-    client.request("stop")
-    t.silence(rig, client)
+    t.stop_until_silent(rig, client)
     t.judge(rig)
 
 

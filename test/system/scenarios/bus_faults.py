@@ -111,8 +111,7 @@ def row19_second_master_listening(t):
     t.check(any(e["event"] == "fault" and e["cause"] == "second_master" for e in client.collect(0.1)), "and the event comes")
     t.rule(not rig.bus.setpoints(), "nothing is sent")
     time.sleep(1.1)
-    t.arm_and_drive(client, 200, 200, 0.5)
-    t.judge(rig)
+    t.drive_and_judge(rig, client)
 
 
 @scenario("forged error frames of a local process: nothing is sent while listening, never motion, no latch", 5)

@@ -74,8 +74,7 @@ def bus_off_listening(t, off, on):
     on(rig)
     time.sleep(1.2)
     t.rule(not rig.bus.setpoints(), "nothing was sent")
-    t.arm_and_drive(client, 200, 200, 0.5)
-    t.judge(rig)
+    t.drive_and_judge(rig, client)
 
 
 def error_passive(t, passive, active):

@@ -60,6 +60,22 @@ def row12_short_pulses(t):
     t.judge(rig, estop_limit_us=WORST_US)
 
 
+def released_from_start(t, rig, client, settle_s, silent_s):
+    """The e-stop was pressed from the start: reset only after the release, and nothing is sent."""
+    for _ in range(5):
+        t.expect(client.request("reset"), "estop_pressed")
+    rig.release()
+    time.sleep(settle_s)
+    t.rule(client.request("status")["state"] == "latched", "release does not unlatch")
+    t.reset(client, 4.0)
+    for _ in range(5):
+        reply = client.request("reset")
+        t.check(reply["ok"] and reply["state"] == "listening", f"repeated reset: {reply}")
+    t.expect(client.drive(200, 200), "not_armed")
+    time.sleep(silent_s)
+    t.rule(not rig.bus.setpoints(), "latched from listening and reset: nothing is sent")
+
+
 @scenario("pressed at start: starts latched; reset while pressed refused; reset repeated counts once", 5)
 def row13_pressed_at_start(t):
     rig, client = t.running(sim=("estop press",), wheels=False)
@@ -67,18 +83,7 @@ def row13_pressed_at_start(t):
     t.stopped_by(client, "estop_line")
     refusal = client.arm()
     t.check(not refusal["ok"] and refusal["error"] in ("estop_pressed", "latched"), f"arm is refused: {refusal}")
-    for _ in range(5):
-        t.expect(client.request("reset"), "estop_pressed")
-    rig.release()
-    time.sleep(0.3)
-    t.rule(client.request("status")["state"] == "latched", "release does not unlatch")
-    t.reset(client, 4.0)
-    for _ in range(5):
-        reply = client.request("reset")
-        t.check(reply["ok"] and reply["state"] == "listening", f"repeated reset: {reply}")
-    t.expect(client.drive(200, 200), "not_armed")
-    time.sleep(0.3)
-    t.rule(not rig.bus.setpoints(), "latched from listening and reset: nothing is sent")
+    released_from_start(t, rig, client, 0.3, 0.3)
     t.judge(rig, moves=False)
 
 

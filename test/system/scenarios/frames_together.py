@@ -47,8 +47,7 @@ def frames_taken_together(t):
     watched, _ = wakes_per_frame(rig)
     t.check(watched >= APART * alone, f"{watched:.2f} wakes for a frame with a client that watches them, {alone:.2f} without", timing=True)
     t.figure(f"{alone:.2f} wakes for a frame, {driving:.2f} while driving, {watched:.2f} watched")
-    client.request("stop")
-    t.silence(rig, client)
+    t.stop_until_silent(rig, client)
     t.judge(rig)
 
 

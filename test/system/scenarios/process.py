@@ -183,8 +183,7 @@ def row24_suspended(t):
     t.stopped_by(client, "loop_hung")
     t.check(re.search("suspended for (199[0-9]|2000) ms", rig.gateway.text()), f"the log has it: {rig.gateway.text()[-300:]}")
     t.reset(client)
-    t.arm_and_drive(client, 200, 200, 0.5)
-    t.judge(rig)
+    t.drive_and_judge(rig, client)
 
 
 # Row 27 ------------------------------------------------------------------------------------------------------------------
@@ -216,7 +215,6 @@ def row27_stderr_blocked(t):
         t.stopped_by(client, "estop_line")
         rig.release()
         t.reset(client)
-    t.arm_and_drive(client, 200, 200, 0.5)
-    t.judge(rig)
+    t.drive_and_judge(rig, client)
     os.close(read_end)
     os.close(write_end)

@@ -23,13 +23,18 @@ def fault_while_driving(t, command, cause, within_ms, speed=400, **expected):
     return rig, client, why
 
 
+def judge_healed(t, rig, client, command, seconds=6.0):
+    """Ends the fault, and resets."""
+    rig.sim.ask(command)
+    t.reset(client, seconds)
+    t.judge(rig)
+
+
 @scenario("left wheel offline", 6)
 def row22_left_silent(t):
     rig, client, _ = fault_while_driving(t, "mute left", "wheel_lost", 80, kind="ramp", side="left")
     t.check(not client.request("reset")["ok"], "no reset while it is offline")
-    rig.sim.ask("unmute left")
-    t.reset(client)
-    t.judge(rig)
+    judge_healed(t, rig, client, "unmute left")
 
 
 @scenario("both wheels offline", 6)
@@ -37,26 +42,20 @@ def row22_both_silent(t):
     rig, client, _ = fault_while_driving(t, "mute both", "wheel_lost", 80)  # microseconds decide which side is named
     status = client.request("status")
     t.check(not status["left"]["heard"] and not status["right"]["heard"], "both are offline")
-    rig.sim.ask("unmute both")
-    t.reset(client)
-    t.judge(rig)
+    judge_healed(t, rig, client, "unmute both")
 
 
 @scenario("both wheels' feedback with the wrong sign", 6)
 def row22_sign_swapped(t):
     rig, client, _ = fault_while_driving(t, "sign both swapped", "feedback_sign", 420)
-    rig.sim.ask("sign both normal")
-    t.reset(client)
-    t.judge(rig)
+    judge_healed(t, rig, client, "sign both normal")
 
 
 @scenario("both wheels faster than commanded", 6)
 def row22_overspeed(t):
     rig, client, _ = fault_while_driving(t, "runaway both on", "overspeed", 3000)
     t.check(not client.request("reset")["ok"], "no reset while they turn")
-    rig.sim.ask("runaway both off")
-    t.reset(client, 8)
-    t.judge(rig)
+    judge_healed(t, rig, client, "runaway both off", 8)
 
 
 @scenario("both wheels blocked: ramp, not latched", 7)
