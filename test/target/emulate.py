@@ -42,6 +42,14 @@ class Rig:
     def run(self, span_ns):
         self.machine.run(span_ns)
 
+    def open_estop(self):
+        """Nothing but the pull-up drives the pin then, as with a cut wire. Returns when."""
+        self.machine.board.drive("estop", None)
+        return self.machine.now_ns
+
+    def close_estop(self):
+        self.machine.board.drive("estop", 0)
+
     def setpoints(self, since_ns=0, until_ns=None):
         return self.machine.bus.setpoints(since_ns, until_ns)
 

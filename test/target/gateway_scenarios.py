@@ -11,7 +11,7 @@ import beginnings
 import unicorn
 from emulator.can import LEFT
 from emulator.chip import MS, PINRSTF, US
-from host import Host, framed
+from host import Host
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 SECOND = 1000 * MS
@@ -32,6 +32,24 @@ def assert_stops(rig, since_ns, within_ns, after_ns=SECOND):
     late = moving(rig, since_ns + within_ns)
     assert not late, f"{late[0].setpoint()} {(late[0].time_ns - since_ns) / MS:.1f} ms after"
     assert rig.setpoints(since_ns), "no zeros were sent"
+
+
+def stopped_at(rig, pressed_ns, what=""):
+    """When the first zero after the edge was sent; nothing moves after it."""
+    zero = next((frame for frame in rig.setpoints(pressed_ns) if frame.setpoint() == ZERO), None)
+    assert zero is not None, f"{what}no zero after the e-stop"
+    assert not moving(rig, zero.time_ns), f"{what}motion after the e-stop"
+    return zero.time_ns
+
+
+def stage(host, key, value):
+    return host.ask(1, {"cmd": "config", "key": key, "value": value})
+
+
+def commit(host):
+    """Stores the staged values; the board starts again with them."""
+    assert host.ask(1, {"cmd": "config", "commit": True})["restarts"]
+    host.begin_again()
 
 
 @beginnings.shared
@@ -151,7 +169,7 @@ def silent_relay(rig):
 def relay_killed_and_anew(rig):
     """Another relay begins: the clients of the one before it have ended, and their commands are old."""
     host = start_driving(rig)
-    old = framed(b"1 " + host.quoted(1, {"cmd": "drive", "left_mm_s": SPEED, "right_mm_s": SPEED, "id": 7})) + b"\n"
+    old = host.drive_line(SPEED, id=7)
     host.say(0, {"cmd": "link"})
     begun_ns = rig.machine.now_ns
     rig.run(PERIOD_NS + RAMP_NS + 30 * MS)
@@ -172,7 +190,7 @@ def relay_stopped_goes_on(rig):
     """The relay is stopped for 0.3 s and then sends the lines that waited: none of them moves anything, because their stamps are old."""
     host = start_driving(rig)
     host.fall_silent()
-    backlog = [framed(b"1 " + host.quoted(1, {"cmd": "drive", "left_mm_s": 300, "right_mm_s": 300})) + b"\n" for _ in range(15)]
+    backlog = [host.drive_line(300) for _ in range(15)]
     stopped_ns = rig.machine.now_ns
     rig.run(300 * MS)
     host.raw(b"".join(backlog))
@@ -228,20 +246,17 @@ def estop_random(rig):
         host.say(1, {"cmd": "status", "id": "big"})
         host.drive(SPEED, wait=False)
         rig.run(chance.randrange(20_000) * US)
-        rig.machine.board.drive("estop", None)
-        pressed_ns = rig.machine.now_ns
+        pressed_ns = rig.open_estop()
         host.keep_driving(SPEED, 100)
-        after = rig.setpoints(pressed_ns)
-        zero = next(frame for frame in after if frame.setpoint() == ZERO)
-        worst_ns = max(worst_ns, zero.time_ns - pressed_ns)
-        assert not moving(rig, zero.time_ns), "motion after the e-stop"
+        zero_ns = stopped_at(rig, pressed_ns)
+        worst_ns = max(worst_ns, zero_ns - pressed_ns)
         assert host.ask(1, {"cmd": "reset"})["error"] == "estop_pressed"
-        rig.machine.board.drive("estop", 0)
+        rig.close_estop()
         rig.run(1300 * MS)
         assert host.drive(SPEED)["error"] == "latched"
         rig.run(600 * MS)
         assert host.ask(1, {"cmd": "reset"})["ok"], host.lines[-1].message
-        assert not moving(rig, zero.time_ns), "a reset moved the wheels"
+        assert not moving(rig, zero_ns), "a reset moved the wheels"
         host.arm()
     assert worst_ns <= EDGE_TO_ZERO_NS, f"first zero {worst_ns / MS:.3f} ms after the edge"
     rig.note(f"edge to zero on the bus at most {worst_ns / MS:.2f} ms")
@@ -308,16 +323,13 @@ def estop_in_floods(rig):
             rig.run(2 * MS + chance.randrange(3000) * US)
             before = rig.setpoints()[-1].setpoint()
             assert before[0] == SPEED or name in ENDS_MOTION, f"{name}: the wheels are not driven"
-            rig.machine.board.drive("estop", None)
-            pressed_ns = rig.machine.now_ns
+            pressed_ns = rig.open_estop()
             rig.run(60 * MS)
             host.listen()
             if before != ZERO:
-                zero = next(frame for frame in rig.setpoints(pressed_ns) if frame.setpoint() == ZERO)
-                worst[name] = max(worst.get(name, 0), zero.time_ns - pressed_ns)
-                assert not moving(rig, zero.time_ns), f"{name}: motion after the e-stop"
+                worst[name] = max(worst.get(name, 0), stopped_at(rig, pressed_ns, f"{name}: ") - pressed_ns)
             assert not moving(rig, pressed_ns + EDGE_TO_ZERO_NS), f"{name}: motion after the e-stop"
-            rig.machine.board.drive("estop", 0)
+            rig.close_estop()
             rig.run(1900 * MS)
             if name == "relay: link":
                 host.open(1)
@@ -396,9 +408,9 @@ def config_in_flash(rig):
         ("left.invert", "maybe", "no or yes"),
         ("drive.lease_ms", "2e2", "20 to 500"),
     ):
-        refused = host.ask(1, {"cmd": "config", "key": key, "value": value})
+        refused = stage(host, key, value)
         assert refused["error"] == "bad_value" and words in refused["message"], refused
-    host.ask(1, {"cmd": "config", "key": "drive.max_speed_mm_s", "value": 5000})
+    stage(host, "drive.max_speed_mm_s", 5000)
     assert "exceeds 1000 ms" in host.ask(1, {"cmd": "config", "commit": True})["message"]
     assert keys_of(host.ask(1, {"cmd": "config", "commit": False})) == keys_of(first)
     host.arm()
@@ -410,15 +422,14 @@ def config_in_flash(rig):
         ("right.invert", "yes"),
         ("wheels.current_role", "limit"),
     ):
-        assert host.ask(1, {"cmd": "config", "key": key, "value": value})["staged"]
+        assert stage(host, key, value)["staged"]
     assert host.ask(1, {"cmd": "config", "commit": True})["error"] == "denied", "written while the wheels turn"
     host.ask(1, {"cmd": "stop"})
     rig.run(300 * MS)
     assert host.ask(1, {"cmd": "config", "commit": True})["error"] == "denied", "written in the hold"
     rig.run(2 * SECOND)
     before, boot = rig.machine.flash.erasures, host.boot
-    assert host.ask(1, {"cmd": "config", "commit": True})["restarts"]
-    host.begin_again()
+    commit(host)
     assert rig.machine.flash.erasures == before and host.boot != boot
     wanted = {**keys_of(first), "drive.lease_ms": "300", "wheels.gear_ratio": "31/2", "wheels.track_mm": "600", "right.invert": "yes"}
     assert keys_of(host.ask(1, {"cmd": "config"})) == wanted
@@ -438,7 +449,7 @@ def power_cut_while_writing(rig):
         assert host.boot not in boots, "two starts have one name"
         boots.add(host.boot)
         value += 1
-        host.ask(1, {"cmd": "config", "key": "drive.lease_ms", "value": value})
+        stage(host, "drive.lease_ms", value)
         rig.machine.flash.cut_after, rig.machine.flash.eccr_lost = cut, cut % 2
         host.say(1, {"cmd": "config", "commit": True})
         rig.run(100 * MS)
@@ -488,9 +499,8 @@ def refused_record(rig):
     """A stored value that this version does not accept: the board sends nothing, names the value, and retains the other keys."""
     host = start(rig)
     for key, value in (("wheels.radius_mm", 259), ("right.invert", "yes")):
-        host.ask(1, {"cmd": "config", "key": key, "value": value})
-    assert host.ask(1, {"cmd": "config", "commit": True})["restarts"]
-    host.begin_again()
+        stage(host, key, value)
+    commit(host)
     change_stored(rig.machine.flash, 259, 401)
     rig.machine.lose_power()
     host.begin_again()
@@ -499,10 +509,9 @@ def refused_record(rig):
     assert refused["message"] == "stored settings not in force: wheels.radius_mm must be 60 to 400", refused
     rig.run(3 * SECOND)
     assert len(rig.setpoints()) == sent, "it sends"
-    staged = keys_of(host.ask(1, {"cmd": "config", "key": "wheels.radius_mm", "value": 260}))
+    staged = keys_of(stage(host, "wheels.radius_mm", 260))
     assert staged["right.invert"] == "yes", staged
-    assert host.ask(1, {"cmd": "config", "commit": True})["restarts"]
-    host.begin_again()
+    commit(host)
     now = keys_of(host.ask(1, {"cmd": "config"}))
     assert now == staged and now["wheels.radius_mm"] == "260", now
     host.arm()
@@ -546,9 +555,8 @@ def stored_in_flash(rig):
     assert (left["offset_provenance"], left["offset_origin"], left["force_offset_mN"], left["offset_samples"]) == ("stored", "operator", tared, 40), left
     assert assumptions["wheel_radius"] == {"state": "confirmed", "evidence": "operator"}, assumptions["wheel_radius"]
     assert assumptions["dlc"]["state"] == "confirmed" and assumptions["dlc"]["evidence"] == "bus"
-    host.ask(1, {"cmd": "config", "key": "wheels.radius_mm", "value": 180})
-    assert host.ask(1, {"cmd": "config", "commit": True})["restarts"]
-    host.begin_again()
+    stage(host, "wheels.radius_mm", 180)
+    commit(host)
     status = host.ask(1, {"cmd": "status"})
     assert status["ledger"]["wheel_radius"]["state"] == "assumed" and status["left"]["force_offset_mN"] == tared
     rig.expect_resets("power", "software")
@@ -558,9 +566,8 @@ def stored_in_flash(rig):
 def power_cut_while_learning(rig):
     """Power fails after any number of stored words: the board restores the old or the new record, and retains the configuration."""
     host, says, known = start(rig), True, "assumed"
-    host.ask(1, {"cmd": "config", "key": "drive.lease_ms", "value": 250})
-    host.ask(1, {"cmd": "config", "commit": True})
-    host.begin_again()
+    stage(host, "drive.lease_ms", 250)
+    commit(host)
     cuts = (*range(0, 125, 14), 140, 30, 140) if rig.machine.flash.unit == 2 else (*range(0, 62, 7), 70, 30, 70)
     for cut in cuts:
         says = known != "confirmed"
@@ -586,6 +593,10 @@ def fault_of(host):
     return (events[-1]["fault_cause"], events[-1]["fault_pc"]) if "fault_cause" in events[-1] else None
 
 
+def assert_zeros_first(rig, failed_ns):
+    assert rig.setpoints(failed_ns)[0].time_ns - failed_ns < 50 * MS and not moving(rig, failed_ns), "no zeros first"
+
+
 def fault_is_reported(rig):
     """A fault in motion: zeros first, and the next starts report its cause and address, also after power-off. A fault that repeats itself does not wear
     out the flash."""
@@ -602,8 +613,7 @@ def fault_is_reported(rig):
     fault(0x60000000)
     failed_ns = machine.now_ns
     host.begin_again()
-    zeros = rig.setpoints(failed_ns)
-    assert zeros[0].time_ns - failed_ns < 50 * MS and not moving(rig, failed_ns), "no zeros first"
+    assert_zeros_first(rig, failed_ns)
     assert fault_of(host) == (3 << 26 | 1 << 8, 0x60000000), fault_of(host)
     operations = machine.flash.operations
     rig.run(2 * SECOND)
@@ -626,8 +636,7 @@ def program_unreadable(rig):
     machine.flash.report(1 << 31)
     failed_ns = machine.now_ns
     host.begin_again()
-    zeros = rig.setpoints(failed_ns)
-    assert zeros[0].time_ns - failed_ns < 50 * MS and not moving(rig, failed_ns), "no zeros first"
+    assert_zeros_first(rig, failed_ns)
     assert fault_of(host)[0] >> 26 == 2, fault_of(host)
     rig.expect_resets("software")
 
@@ -691,7 +700,7 @@ def hostile_line(rig):
     count = 0
     for _ in range(60):
         for _ in range(12):
-            good = framed(b"1 " + host.quoted(1, {"cmd": "drive", "left_mm_s": 777, "right_mm_s": 777})) + b"\n"
+            good = host.drive_line(777)
             captured.append(good)
             bad = damaged(chance, good)
             host.raw(bad if bad.rstrip(b"\n") != good.rstrip(b"\n") else b"\n")
@@ -709,7 +718,7 @@ def hostile_line(rig):
         rig.run(5 * MS)
     assert not [frame for frame in rig.setpoints() if frame.setpoint()[0] > SPEED], "an old line was obeyed"
     host.drive(50)
-    fresh = framed(b"1 " + host.quoted(1, {"cmd": "drive", "left_mm_s": 60, "right_mm_s": 60})) + b"\n"
+    fresh = host.drive_line(60)
     for _ in range(50):  # Doubled: obeyed once, fed once.
         host.raw(fresh)
         count += 1
@@ -727,12 +736,9 @@ def noise_on_the_wire(rig):
         rig.run(10 * MS)
     host.raw(bytes(random.Random(1).randrange(256) for _ in range(20000)))
     rig.run(3 * MS)
-    rig.machine.board.drive("estop", None)
-    pressed_ns = rig.machine.now_ns
+    pressed_ns = rig.open_estop()
     rig.run(300 * MS)
-    zero = next((frame for frame in rig.setpoints(pressed_ns) if frame.setpoint() == ZERO), None)
-    assert zero is not None and zero.time_ns - pressed_ns <= EDGE_TO_ZERO_NS
-    assert not moving(rig, zero.time_ns)
+    assert stopped_at(rig, pressed_ns) - pressed_ns <= EDGE_TO_ZERO_NS
 
 
 def another_rate(rig):
@@ -746,11 +752,9 @@ def another_rate(rig):
     assert len(frames) > 70 and all(frame.setpoint()[0] == SPEED for frame in frames), "the line did not carry the commands in time"
     assert host.ask(1, {"cmd": "status"}, 600)["state"] == "armed" and not host.events("line_error")
     host.keep_driving(SPEED, 40)
-    rig.machine.board.drive("estop", None)
-    pressed_ns = rig.machine.now_ns
+    pressed_ns = rig.open_estop()
     rig.run(100 * MS)
-    zero = next(frame for frame in rig.setpoints(pressed_ns) if frame.setpoint() == ZERO)
-    assert zero.time_ns - pressed_ns <= EDGE_TO_ZERO_NS and not moving(rig, zero.time_ns)
+    assert stopped_at(rig, pressed_ns) - pressed_ns <= EDGE_TO_ZERO_NS
 
 
 def dma_errors(rig):

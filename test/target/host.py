@@ -121,6 +121,10 @@ class Host:
         quote = compact({"boot": boot or self.boot, "seq": seq, "t_us": self.t_us if t_us is None else t_us})
         return quote[:-1] + b"," + compact(message)[1:]
 
+    def drive_line(self, speed_mm_s, **fields):
+        """A line of channel 1 that may be sent later, more than once or changed."""
+        return framed(b"1 " + self.quoted(1, {"cmd": "drive", "left_mm_s": speed_mm_s, "right_mm_s": speed_mm_s, **fields})) + b"\n"
+
     def drive(self, speed_mm_s, channel=1, wait=True, **quote):
         self.number += 1
         number = self.number

@@ -67,18 +67,23 @@ def assert_held_then_silent(rig, since_ns, hold_ns=1475 * MS):
     assert rig.machine.now_ns - frames[-1].time_ns > 300 * MS, "setpoints after the hold"
 
 
-def open_estop(rig):
-    rig.machine.board.drive("estop", None)  # Nothing but the pull-up drives the pin then, as with a cut wire.
-
-
-def close_estop(rig):
-    rig.machine.board.drive("estop", 0)
+def assert_zeros_first(rig, since_ns):
+    """After a start or a return of the board at that time: zeros soon, and nothing else."""
+    frames = rig.setpoints(since_ns)
+    assert frames and frames[0].time_ns - since_ns < 300 * MS, "no zeros first"
+    assert_zero(frames)
 
 
 def press_button(rig, span_ns=60 * MS):
     rig.machine.board.drive("button", 0)
     rig.run(span_ns)
     rig.machine.board.drive("button", None)
+
+
+def reset_and_arm(rig):
+    press_button(rig)
+    rig.run(SECOND)
+    assert_lamp(rig, ARMED)
 
 
 @beginnings.shared
@@ -145,13 +150,16 @@ def clock_input(rig):
     assert rig.machine.can.timing() == (1_000_000, 625), rig.machine.can.timing()
 
 
+def power_wheels(rig, is_on):
+    for wheel in rig.machine.bus.wheels:
+        wheel.power(is_on, rig.machine.now_ns)
+
+
 def fast_watchdog(rig):
     """The watchdog's oscillator at its fastest: still no reset, also while no frame wakes the loop."""
-    for wheel in rig.machine.bus.wheels:
-        wheel.power(False, 0)
+    power_wheels(rig, False)
     rig.run(500 * MS)
-    for wheel in rig.machine.bus.wheels:
-        wheel.power(True, rig.machine.now_ns)
+    power_wheels(rig, True)
     arm(rig)
 
 
@@ -198,14 +206,13 @@ def estop(rig):
     """Pressed while armed: a zero within 5 ms, held, then no setpoints, also after the release."""
     arm(rig)
     rig.run(7_300 * US)
-    pressed_ns = rig.machine.now_ns
-    open_estop(rig)
+    pressed_ns = rig.open_estop()
     rig.run(2500 * MS)
     first = rig.setpoints(pressed_ns)[0]
     assert first.time_ns - pressed_ns <= EDGE_TO_ZERO_NS, f"first setpoint {(first.time_ns - pressed_ns) / MS:.3f} ms after the edge"
     assert_held_then_silent(rig, pressed_ns)
     assert_lamp(rig, ESTOP)
-    close_estop(rig)
+    rig.close_estop()
     rig.run(1500 * MS)
     assert_held_then_silent(rig, pressed_ns)
     assert_lamp(rig, LATCHED)
@@ -214,10 +221,9 @@ def estop(rig):
 def estop_pulse(rig):
     """Open for 1 us, which is too short to read the level: latched."""
     arm(rig)
-    pressed_ns = rig.machine.now_ns
-    open_estop(rig)
+    pressed_ns = rig.open_estop()
     rig.run(1 * US)
-    close_estop(rig)
+    rig.close_estop()
     rig.run(2500 * MS)
     assert_held_then_silent(rig, pressed_ns)
     assert_lamp(rig, LATCHED)
@@ -233,8 +239,7 @@ def estop_wakes(rig):
         if machine.bus.current is None and quiet_ns > 1700 * US and 2 * MS < since_pair_ns < 15 * MS:
             break
         rig.run(37 * US)
-    pressed_ns = machine.now_ns
-    open_estop(rig)
+    pressed_ns = rig.open_estop()
     rig.run(20 * MS)
     first = rig.setpoints(pressed_ns)[0]
     assert first.time_ns - pressed_ns < 700 * US, f"first zero {(first.time_ns - pressed_ns) / MS:.3f} ms after the edge"
@@ -245,9 +250,9 @@ def estop_chatters(rig):
     arm(rig)
     since_ns = rig.machine.now_ns
     for _ in range(1000):
-        open_estop(rig)
+        rig.open_estop()
         rig.run(50 * US)
-        close_estop(rig)
+        rig.close_estop()
         rig.run(50 * US)
     assert_gaps(rig.setpoints(since_ns - 30 * MS), 25 * MS)
     rig.run(2500 * MS)
@@ -257,10 +262,10 @@ def estop_chatters(rig):
 
 def estop_at_start(rig):
     """Pressed before power comes: nothing is sent, not after the release either."""
-    open_estop(rig)
+    rig.open_estop()
     rig.run(1200 * MS)
     assert_lamp(rig, ESTOP)
-    close_estop(rig)
+    rig.close_estop()
     rig.run(1200 * MS)
     assert_lamp(rig, LATCHED)
     assert not rig.setpoints() and rig.machine.bus.attempts == 0
@@ -269,13 +274,12 @@ def estop_at_start(rig):
 def reset_by_button(rig):
     """Without a host the button resets a latch: refused while pressed; then the board arms with zeros. The console reports it."""
     arm(rig)
-    pressed_ns = rig.machine.now_ns
-    open_estop(rig)
+    pressed_ns = rig.open_estop()
     rig.run(300 * MS)
     press_button(rig)
     rig.run(500 * MS)
     assert "reset refused: the e-stop is pressed" in rig.console(), rig.console()
-    close_estop(rig)
+    rig.close_estop()
     rig.run(2 * SECOND)
     assert_lamp(rig, LATCHED)
     assert "then press the button on PA1" in rig.console()[-2], rig.console()
@@ -292,9 +296,9 @@ def reset_by_button(rig):
 def reset_while_listening(rig):
     """The image that listens only: a latch is reset by the button, and nothing is sent."""
     rig.run(500 * MS)
-    open_estop(rig)
+    rig.open_estop()
     rig.run(300 * MS)
-    close_estop(rig)
+    rig.close_estop()
     rig.run(1500 * MS)
     assert_lamp(rig, LATCHED)
     press_button(rig)
@@ -319,7 +323,7 @@ def console(rig):
     machine.uart.send(b"?")
     rig.run(500 * MS)
     assert rig.console()[len(lines) - 1 :] == [lines[0], lines[-2], ""], rig.console()
-    open_estop(rig)
+    rig.open_estop()
     rig.run(300 * MS)
     assert rig.console()[-2].startswith("latched by estop_line; bus active; e-stop pressed; to reset: "), rig.console()
     assert_gaps(rig.setpoints(100 * MS), 22 * MS)
@@ -386,20 +390,16 @@ def silence_is_silent(rig):
     bus.acknowledge_chip = False
     rig.run(5 * SECOND)
     attempts = bus.attempts
-    for wheel in bus.wheels:
-        wheel.power(False, rig.machine.now_ns)
+    power_wheels(rig, False)
     rig.run(15 * SECOND)
     assert bus.attempts == attempts, f"{bus.attempts - attempts} attempts after the last zero"
     bus.acknowledge_chip = True
     back_ns = rig.machine.now_ns
-    for wheel in bus.wheels:
-        wheel.power(True, back_ns)
+    power_wheels(rig, True)
     rig.run(2 * SECOND)
     assert not rig.setpoints(back_ns), f"{len(rig.setpoints(back_ns))} frames left by themselves"
     assert_lamp(rig, LATCHED)
-    press_button(rig)
-    rig.run(SECOND)
-    assert_lamp(rig, ARMED)
+    reset_and_arm(rig)
     assert_zero(rig.setpoints(back_ns))
 
 
@@ -415,9 +415,7 @@ def abort_without_end(rig):
     rig.run(2500 * MS)
     assert_zero(rig.setpoints(lost_ns + MS))
     assert_lamp(rig, LATCHED)
-    press_button(rig)
-    rig.run(SECOND)
-    assert_lamp(rig, ARMED)
+    reset_and_arm(rig)
 
 
 def bus_off(rig):
@@ -597,9 +595,15 @@ def crystal_dies(rig):
     rig.machine.clocks.set_crystal(True)
     back_ns = rig.machine.now_ns
     rig.run(3 * SECOND)
-    assert rig.setpoints(back_ns) and rig.setpoints(back_ns)[0].time_ns - back_ns < 300 * MS, "no zeros first"
-    assert_zero(rig.setpoints(back_ns))
+    assert_zeros_first(rig, back_ns)
     rig.expect_resets("software")
+
+
+def assert_watchdog_resets(rig, since_ns):
+    rig.run(300 * MS)
+    rig.expect_resets("watchdog")
+    assert rig.machine.resets, "the watchdog did not reset the chip"
+    assert rig.machine.resets[0][0] - since_ns < 200 * MS, "the watchdog was too late"
 
 
 def hang(rig):
@@ -607,14 +611,9 @@ def hang(rig):
     start_demo(rig)
     hung_ns = rig.machine.now_ns
     rig.machine.frozen = True
-    rig.run(300 * MS)
-    rig.expect_resets("watchdog")
-    assert rig.machine.resets, "the watchdog did not reset the chip"
-    assert rig.machine.resets[0][0] - hung_ns < 200 * MS, "the watchdog was too late"
+    assert_watchdog_resets(rig, hung_ns)
     rig.run(3 * SECOND)
-    reset_ns = rig.machine.resets[0][0]
-    assert rig.setpoints(reset_ns)[0].time_ns - reset_ns < 300 * MS, "no zeros first"
-    assert_zero(rig.setpoints(reset_ns))
+    assert_zeros_first(rig, rig.machine.resets[0][0])
 
 
 def reset_again(rig):
@@ -640,7 +639,7 @@ def reset_again(rig):
 def reset_after_the_hold(rig):
     """A stop that was acknowledged is over: the run after it listens before it arms."""
     start_demo(rig)
-    open_estop(rig)
+    rig.open_estop()
     rig.run(2500 * MS)
     machine = rig.machine
     machine.reset("pin", PINRSTF)
@@ -655,7 +654,7 @@ def reset_after_unproven_hold(rig):
     start_demo(rig)
     machine = rig.machine
     machine.bus.acknowledge_chip = False
-    open_estop(rig)
+    rig.open_estop()
     rig.run(5 * SECOND)
     machine.reset("pin", PINRSTF)
     reset_ns = machine.now_ns
@@ -690,7 +689,7 @@ def stack_overflow(rig):
     assert machine.faults == 1, "no fault"
     reset_ns = machine.resets[0][0]
     assert reset_ns - overflow_ns < 10 * MS, "the fault was not noticed immediately"
-    assert rig.setpoints(reset_ns)[0].time_ns - reset_ns < 300 * MS, "no zeros first"
+    assert_zeros_first(rig, reset_ns)
     assert_zero(rig.setpoints(overflow_ns + MS))
     reports = [line for line in rig.console() if "the previous run ended with fault 0x0C001000 at 0x00000000; the run before" in line]
     assert len(reports) == 1, rig.console()
@@ -701,8 +700,7 @@ def boot_loader(rig):
     rig.machine.start_by_boot_loader()
     rig.expect_resets("boot loader")
     arm(rig)
-    pressed_ns = rig.machine.now_ns
-    open_estop(rig)
+    pressed_ns = rig.open_estop()
     rig.run(1200 * MS)
     assert rig.setpoints(pressed_ns)[0].time_ns - pressed_ns <= EDGE_TO_ZERO_NS
     assert_lamp(rig, ESTOP)
@@ -713,12 +711,9 @@ def loop_stuck(rig):
     start_demo(rig)
     stuck_ns = rig.machine.now_ns
     rig.machine.divert()
-    rig.run(300 * MS)
-    rig.expect_resets("watchdog")
-    assert rig.machine.resets and rig.machine.resets[0][0] - stuck_ns < 200 * MS, "the watchdog did not reset the chip"
+    assert_watchdog_resets(rig, stuck_ns)
     rig.run(2 * SECOND)
-    reset_ns = rig.machine.resets[0][0]
-    assert rig.setpoints(reset_ns)[0].time_ns - reset_ns < 300 * MS, "no zeros first"
+    assert_zeros_first(rig, rig.machine.resets[0][0])
     assert_zero(rig.setpoints(stuck_ns + MS))
 
 
@@ -797,11 +792,10 @@ def demo_estop(rig):
         press_button(rig)
         rig.run(400 * MS + phase_ns)
         assert rig.setpoints()[-1].setpoint()[0] == 100, "no motion"
-        pressed_ns = rig.machine.now_ns
-        open_estop(rig)
+        pressed_ns = rig.open_estop()
         rig.run(300 * MS)
         press_button(rig)  # A reset while pressed is refused.
-        close_estop(rig)
+        rig.close_estop()
         rig.run(300 * MS)
         after = rig.setpoints(pressed_ns)
         zero = next(frame for frame in after if frame.setpoint() == ZERO)
