@@ -187,7 +187,7 @@ class TwoContactsRig(VcanRig):
     def second(self, pressed):
         """Moves the second contact alone; a press may stop the wheels from now on."""
         if pressed:
-            self.timeline.append(Event(now_us(), "cut", within_us=RAW_ESTOP_US))
+            self.note("cut", within_us=RAW_ESTOP_US)
         self.chip.pull(not pressed, self.chip.SECOND)
 
 

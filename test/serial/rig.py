@@ -175,7 +175,7 @@ class SerialRig(Rig):
         return True
 
     def start_gateway(self, *extra, **options):
-        self.timeline.append(Event(now_us(), "start"))
+        self.note("start")
         self.start_board()
         self.start_relay(*extra)
         self.await_relay("board on ")

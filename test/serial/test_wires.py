@@ -158,8 +158,7 @@ def relay_killed(t):
     rig, _ = begin_driving(t, 250, 250, 0.6)
     rig.gateway.signal(signal.SIGKILL)
     rig.gateway.wait(2)
-    killed_us = now_us()
-    rig.timeline.append(Event(killed_us, "ramp", within_us=LEASE_US))
+    rig.note("ramp", within_us=LEASE_US)
     rig.start_relay()
     t.check(rig.await_relay("board on "), f"the next relay finds the board: {rig.gateway.text()}")
     fresh = rig.client()
@@ -182,8 +181,7 @@ def cable_pulled(t):
                 time.sleep(0.01)
         except (Closed, OSError, TimeoutError):
             pass
-        pulled_us = now_us()
-        rig.timeline.append(Event(pulled_us, "ramp", within_us=LEASE_US))
+        rig.note("ramp", within_us=LEASE_US)
         rig.cable.pull()
         while rig.cable.master is not None:
             time.sleep(0.001)
@@ -222,10 +220,10 @@ def board_reset(t):
     watcher = rig.watcher()
     watcher.wait_event("hello")
     t.drive_for(client, 250, 250, 0.5)
-    rig.timeline.append(Event(now_us(), "end"))
+    rig.note("end")
     rig.board.signal(signal.SIGHUP)
-    rig.timeline.append(Event(now_us(), "start"))
-    rig.timeline.append(Event(now_us(), "restart_hold", within_us=300_000))
+    rig.note("start")
+    rig.note("restart_hold", within_us=300_000)
     all_closed(t, rig, (client, watcher), 40, "a reset")
     client = await_service(t, rig)
     t.expect(client.drive(100, 100), "not_armed")
@@ -342,8 +340,7 @@ def delayed(t):
     rig, client = begin_driving(t, 200, 200, 0.4)
     rig.cable.held = True
     time.sleep(0.03)  # The cable has delivered the bytes that it held.
-    held_us = now_us()
-    rig.timeline.append(Event(held_us, "ramp", within_us=LEASE_US))
+    held_us = rig.note("ramp", within_us=LEASE_US)
     for number in range(60):
         client.send_raw(raw_drive(number, 200))
         time.sleep(0.01)
@@ -547,7 +544,7 @@ def fault_of_the_board(t):
 @scenario("ends cleanly by SIGTERM while a client drives", 3)
 def terminated(t):
     rig, _ = begin_driving(t, 200, 200, 0.4)
-    rig.timeline.append(Event(now_us(), "gone"))
+    rig.note("gone")
     rig.gateway.signal(signal.SIGTERM)
     t.check(rig.gateway.wait(2) == 0, f"exit code: {rig.gateway.text()[-300:]}")
     t.check(not os.path.exists(rig.path("gateway.sock")), "its socket is removed")

@@ -162,7 +162,9 @@ class Streamer(threading.Thread):
             due += self.every
             self.quit.wait(max(0, due - time.monotonic()))
 
-    def stop(self):
+    def stop(self, after=0.0):
+        """Ends it after that time; returns the refusal, if there was one."""
+        time.sleep(after)
         self.quit.set()
         self.join(4)
         return self.refusal

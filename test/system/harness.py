@@ -394,7 +394,7 @@ class Rig:
 
     def kill_gateway(self, number):
         """Ends it by a signal that it cannot or does not handle."""
-        self.timeline.append(Event(now_us(), "end"))
+        self.note("end")
         self.gateway.signal(number)
         return self.gateway.wait(3)
 
@@ -444,7 +444,10 @@ class Rig:
     # The timeline -----------------------------------------------------------------------------------------------------
 
     def note(self, kind, **fields):
-        self.timeline.append(Event(now_us(), kind, **fields))
+        """Adds an event of now to the timeline; returns its time."""
+        event = Event(now_us(), kind, **fields)
+        self.timeline.append(event)
+        return event.t_us
 
     def pressed_by(self, action):
         """Does what counts as a press of the e-stop. Returns when it began."""

@@ -63,13 +63,11 @@ def stalled(t, seconds, setup=None):
     rig.note("cut", within_us=150_000)
     rig.adapter.stall(True)
     rig.note("dead")
-    time.sleep(seconds)
-    stream.stop()
+    stream.stop(after=seconds)
     if seconds > 0.5:
         t.check(client.request("status")["state"] == "latched", "latched while it stalls")
     rig.adapter.stall(False)
-    back_us = now_us()
-    rig.note("alive")
+    back_us = rig.note("alive")
     return rig, client, back_us
 
 
@@ -125,8 +123,7 @@ def power_cut(t, seconds, setup):
     rig, client, stream = t.driving({"drive": {"accel_mm_s2": 2000}}, setup=setup, speed=800, seconds=1.0)
     rig.fault("power off", within_ms=120)
     rig.note("dead")
-    time.sleep(0.3)
-    stream.stop()
+    stream.stop(after=0.3)
     t.check(client.request("status")["state"] == "latched", "latched")
     t.check(not client.request("reset")["ok"], "reset is refused until the wheels are online")
     time.sleep(seconds)

@@ -43,8 +43,7 @@ def drive_while(halt, afterwards=None):
     def seeded(t):
         rig, _, stream = t.driving(seconds=0.4, every=0.05)
         halt(t, rig)
-        time.sleep(0.3)
-        refusal = stream.stop()
+        refusal = stream.stop(after=0.3)
         t.check(refusal is None, f"drive was refused: {refusal}")
         if afterwards:
             afterwards(rig)
@@ -131,8 +130,7 @@ def late_press(t, delay):
     undo = delay(rig)
     edge_us = rig.press()
     undo()
-    time.sleep(0.3)
-    stream.stop()
+    stream.stop(after=0.3)
     judge = rig.judge(estop_limit_us=1 << 62)
     found = [t.after_edge(rig, judge, *pair) for pair in judge.estop_latencies]
     found = [us for at_us, us in found if not t.excused(at_us, us)]

@@ -25,8 +25,7 @@ def driving_process(t, rig, speed=300, seconds=0.9):
 def row01_client_killed(t):
     rig, client = t.running()
     process = driving_process(t, rig)
-    killed_us = now_us()
-    rig.timeline.append(Event(killed_us, "gone"))
+    killed_us = rig.note("gone")
     process.signal(signal.SIGKILL)
     ms = t.first_after(rig, killed_us, lambda speed: speed < 300, "the ramp begins", 60) if not time.sleep(0.3) else None
     t.figure(f"ramp after {ms or 0:.0f} ms")
@@ -102,8 +101,7 @@ def row04_two_clients(t):
     t.check(rig.wait_status(second, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"] and s["left"]["applied_mm_s"] == 0, 4), "at standstill")
     time.sleep(0.6)
     t.arm(second, takeover=True)
-    time.sleep(0.15)
-    refusal = stream.stop()
+    refusal = stream.stop(after=0.15)
     t.check(refusal and refusal["error"] == "not_holder", f"the former holder is refused: {refusal}")
     t.check(any(e["event"] == "lease" and e.get("change") in ("lost", "moved") for e in first.collect(0.2)), "the former holder gets an event")
     t.drive_for(second, 150, 150, 0.6)

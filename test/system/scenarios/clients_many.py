@@ -109,8 +109,7 @@ def row05_out_of_descriptors(t):
     t.figure(f"{percent:.0f} % CPU without a free descriptor")
     for sock in crowd:
         sock.close()
-    time.sleep(0.5)
-    t.check(stream.stop() is None, f"the owner was refused: {stream.refusal}")
+    t.check(stream.stop(after=0.5) is None, f"the owner was refused: {stream.refusal}")
     late = rig.client("late")
     t.expect(late.request("hello"))
     t.check(os.path.exists(rig.path("gateway.sock")), "the socket still exists")
@@ -144,8 +143,7 @@ def row05_sixty_observers(t):
         for _ in range(6):
             stream = t.start_driving(owner, 300, 300, 0.5)
             rig.press()
-            time.sleep(0.3)
-            stream.stop()
+            stream.stop(after=0.3)
             rig.release()
             t.reset(owner)
     finally:
@@ -337,8 +335,7 @@ def row33_iwheelctl_stops(t):
                 if moved:
                     os.rename(away, moved)
                 t.check(code == 0, f"{verb[0]} with {moved} away: {code}: {text!r}")
-                time.sleep(0.1)
-                stream.stop()
+                stream.stop(after=0.1)
                 t.check(stream.refusal is not None, f"{verb[0]} with {moved} away stopped no client")
                 if verb[0] == "estop":
                     time.sleep(1.2)

@@ -53,8 +53,7 @@ def row12_short_pulses(t):
     for pulse_ms in (1, 2, 5, 10, 20):
         stream = t.start_driving(client, 200, 200, 0.25)
         rig.pressed_by(lambda: rig.sim.ask(f"estop pulse {pulse_ms}"))
-        time.sleep(0.1)
-        stream.stop()
+        stream.stop(after=0.1)
         t.stopped_by(client, "estop_line")
         t.reset(client, 4.0)
     t.judge(rig, estop_limit_us=WORST_US)
@@ -100,8 +99,7 @@ def press_contact(t, rig, client, number):
     """Arms, drives, presses one contact alone. The gateway stops and names the contact."""
     stream = t.start_driving(client, 300, 300, 0.4)
     rig.pressed_by(lambda: rig.sim.ask(f"contact {number} press"))
-    time.sleep(0.1)
-    stream.stop()
+    stream.stop(after=0.1)
     t.stopped_by(client, "estop_line")
     reported = client.request("status")["estop"]
     at = "line" if number == 1 else "line2"
@@ -184,8 +182,7 @@ def software_estop(t):
     stream = t.start_driving(owner, 400, 400, 0.6)
     guard = rig.client("guard")
     t.expect(guard.request("estop", reason="a person in the way"))
-    time.sleep(0.1)
-    stream.stop()
+    stream.stop(after=0.1)
     why = t.stopped_by(guard, "estop_software")
     t.check("a person in the way" in why["sentence"], f"why has the reason: {why['sentence']}")
     t.reset(guard, 4.0)
@@ -235,8 +232,7 @@ def row14_button_dies(t):
     client = rig.connect_to_new()
     stream = t.start_driving(client, 300, 300, 0.6)
     rig.pressed_by(button.die)
-    time.sleep(0.2)
-    stream.stop()
+    stream.stop(after=0.2)
     t.stopped_by(client, "estop_line")
     t.check(rig.gateway.cpu_share(1.0) < 0.5, "no busy loop without a button", True)
     t.expect(client.request("reset"), "estop_pressed")

@@ -127,8 +127,7 @@ def ended_by(t, number):
     time.sleep(0.3)
     rig.gateway.signal(number)
     code = rig.gateway.wait(6)
-    ended_us = now_us()
-    rig.timeline.append(Event(ended_us, "exit"))
+    ended_us = rig.note("exit")
     stream.stop()
     t.check(code == 0, f"exit code {code}")
     zeros = [at for at, _, speed in rig.bus.setpoints(t_us) if speed == 0]

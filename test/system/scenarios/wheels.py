@@ -13,8 +13,7 @@ def fault_while_driving(t, command, cause, within_ms, speed=400, **expected):
     kind = expected.get("kind", "cut")
     fault_us = now_us()
     rig.fault(command, kind, within_ms)
-    time.sleep(within_ms / 1000 + 0.25)
-    stream.stop()
+    stream.stop(after=within_ms / 1000 + 0.25)
     ms = t.first_after(rig, fault_us, lambda value: abs(value) < speed, "the reaction", within_ms)
     t.figure(f"reaction after {ms or 0:.0f} ms")
     why = t.stopped_by(client, cause, expected.get("state", "latched"))
@@ -103,8 +102,7 @@ def row31_third_latches(t):
     for attempt in range(3):
         stream = t.start_driving(client, 300, 300, 0.7)
         rig.fault("block left", within_ms=300)
-        time.sleep(0.5)
-        stream.stop()
+        stream.stop(after=0.5)
         state = client.request("status")["state"]
         t.check(state == ("latched" if attempt == 2 else "stopping"), f"stop {attempt + 1}: {state}")
         rig.sim.ask("unblock left")
@@ -118,8 +116,7 @@ def row31_third_latches(t):
 def trap07_reboot_while_driving(t):
     rig, client, stream = t.driving(seconds=0.9, every=0.05)
     rig.fault("reboot right", "ramp", within_ms=80)  # At first it sends nothing: one wheel offline.
-    time.sleep(0.4)
-    stream.stop()
+    stream.stop(after=0.4)
     status = client.request("status")
     t.check(status["state"] == "latched" and status["cause"] in ("wheel_lost", "wheel_rebooted"), f"{status['state']}, {status['cause']}")
     t.check(rig.wait_status(client, lambda s: s["right"]["at_rest"], 6), "it comes back")
