@@ -149,6 +149,10 @@ void rig_init(int device, bool silent) {
 
 void rig_start(int device) {
     rig_init(device, false);
+    rig_assert_joins(device);
+}
+
+void rig_assert_joins(int device) {
     (void)can_bus_state(&rig[device].driver);
     rig_assert_active_after(device, 11);
 }
@@ -235,6 +239,11 @@ void rig_assert_on_bus(uint32_t id, uint8_t mark) {
 void rig_assert_nothing_waits(void) {
     model_frame_t frame;
     TEST_ASSERT_FALSE(rig_send_next(0, &frame));
+}
+
+void rig_assert_idle(void) {
+    rig_assert_nothing_waits();
+    rig_assert_no_echo();
 }
 
 void rig_assert_echo(uint32_t id, uint8_t mark) {

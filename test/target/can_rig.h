@@ -125,6 +125,9 @@ void rig_init(int device, bool silent);
 /// Initialises the driver and brings it to RUNNING with a quiet bus. Fails the test if it does not get there.
 void rig_start(int device);
 
+/// The driver is asked for its state, and the bus is quiet. Fails the test if the device does not take part in the bus then.
+void rig_assert_joins(int device);
+
 /// The bus is recessive for that many bits. Fails the test if the device does not take part in the bus then.
 void rig_assert_active_after(int device, uint32_t bits);
 
@@ -155,6 +158,9 @@ void rig_assert_nothing_waits(void);
 /// The next frame that driver 0 delivers is the echo of this one, or there is no next frame.
 void rig_assert_echo(uint32_t id, uint8_t mark);
 void rig_assert_no_echo(void);
+
+/// Device 0 has no frame to send, and driver 0 delivers none.
+void rig_assert_idle(void);
 
 /// The next frame that driver 0 delivers reports that frames were lost.
 void rig_assert_loss_reported(void);

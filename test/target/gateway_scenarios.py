@@ -433,8 +433,7 @@ def config_in_flash(rig):
     assert rig.machine.flash.erasures == before and host.boot != boot
     wanted = {**keys_of(first), "drive.lease_ms": "300", "wheels.gear_ratio": "31/2", "wheels.track_mm": "600", "right.invert": "yes"}
     assert keys_of(host.ask(1, {"cmd": "config"})) == wanted
-    rig.machine.lose_power()
-    host.begin_again()
+    host.power_cycle()
     assert keys_of(host.ask(1, {"cmd": "config"})) == wanted and host.ask(1, {"cmd": "status"})["lease"]["lease_ms"] == 300
     assert host.arm()["lease_ms"] == 300
     rig.expect_resets("software", "power")
@@ -502,8 +501,7 @@ def refused_record(rig):
         stage(host, key, value)
     commit(host)
     change_stored(rig.machine.flash, 259, 401)
-    rig.machine.lose_power()
-    host.begin_again()
+    host.power_cycle()
     sent = len(rig.setpoints())
     refused = host.ask(1, {"cmd": "arm"})
     assert refused["message"] == "stored settings not in force: wheels.radius_mm must be 60 to 400", refused
@@ -546,8 +544,7 @@ def stored_in_flash(rig):
     rig.run(5 * SECOND)
     assert flash.operations == now, "the same is written again"
     stack = rig.stack_used()
-    rig.machine.lose_power()
-    host.begin_again()
+    host.power_cycle()
     rig.run(600 * MS)
     status = host.ask(1, {"cmd": "status"})
     left, assumptions = status["left"], status["ledger"]
@@ -575,8 +572,7 @@ def power_cut_while_learning(rig):
         rig.machine.flash.cut_after = cut
         rig.run(2500 * MS)
         rig.machine.flash.cut_after = None
-        rig.machine.lose_power()
-        host.begin_again()
+        host.power_cycle()
         now, status = keys_of(host.ask(1, {"cmd": "config"})), host.ask(1, {"cmd": "status"})
         assert now["drive.lease_ms"] == "250", now
         after = status["ledger"]["track"]["state"]
@@ -621,11 +617,9 @@ def fault_is_reported(rig):
     host.begin_again()
     assert fault_of(host) == (3 << 26 | 1 << 8, 0x60000010), "the newest fault is not reported"
     assert machine.flash.operations == operations, "each fault is written to the flash"
-    machine.lose_power()
-    host.begin_again()
+    host.power_cycle()
     assert fault_of(host) == (3 << 26 | 1 << 8, 0x60000000), "the first fault did not survive power-off"
-    machine.lose_power()
-    host.begin_again()
+    host.power_cycle()
     assert fault_of(host) is None, "an old fault is reported for ever"
     rig.expect_resets("software", "software", "power", "power")
 

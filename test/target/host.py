@@ -113,6 +113,10 @@ class Host:
         self.t_us = 0
         return self.begin(channel)
 
+    def power_cycle(self):
+        self.machine.lose_power()
+        self.begin_again()
+
     def quoted(self, channel, message, t_us=None, boot=None, seq=None):
         """The request with a quote, as the relay writes it."""
         self.listen()

@@ -44,16 +44,14 @@ TEST(test_bus_controller_without_a_reply_is_down_and_recovers) {
     model->deaf = false;
     (void)state();
     can_model_recessive(model, 11);
-    (void)state();
-    rig_assert_active_after(0, 11);
+    rig_assert_joins(0);
 }
 
 TEST(test_bus_unexpected_reset_is_reported_and_repaired) {
     rig_start(0);
     can_model_reset(model, 28);
     TEST_ASSERT_EQUAL(IW_BUS_DOWN, state());
-    (void)state();
-    rig_assert_active_after(0, 11);
+    rig_assert_joins(0);
     TEST_ASSERT_EQUAL_HEX32(RIG_TIMING, can_model_read(model, RIG_TIMING_REGISTER));
 }
 
@@ -82,15 +80,13 @@ TEST(test_bus_unexpected_initialisation_mode_is_left) {
     rig_start(0);
     can_model_write(model, RIG_MODE_REGISTER, RIG_MODE_INIT);
     TEST_ASSERT_EQUAL(IW_BUS_DOWN, state());
-    (void)state();
-    rig_assert_active_after(0, 11);
+    rig_assert_joins(0);
 }
 
 TEST(test_bus_silent_device_only_receives) {
     iw_can_frame_t first_frame;
     rig_init(0, true);
-    (void)state();
-    rig_assert_active_after(0, 11);
+    rig_assert_joins(0);
     TEST_ASSERT_FALSE(rig_hear(0, 256, 4));
     TEST_ASSERT_EQUAL(1, can_receive(driver, &first_frame));
     TEST_ASSERT_LESS_THAN(0, rig_send(266, 1));
@@ -152,8 +148,7 @@ TEST(test_bus_frame_from_before_bus_off_is_not_sent_after_it) {
     (void)state();
     (void)state();
     rig_assert_active_after(0, RIG_REJOIN_BITS);
-    rig_assert_nothing_waits();
-    rig_assert_no_echo();
+    rig_assert_idle();
 }
 
 #ifndef IWHEEL_RIG_FDCAN

@@ -130,8 +130,7 @@ TEST(test_pair_with_a_wrong_frame_is_refused_completely) {
     const iw_can_frame_t right_wrong[] = {rig_frame(266, 1), rig_frame(0x800, 2)};
     TEST_ASSERT_LESS_THAN(0, can_send(driver, left_wrong, 2));
     TEST_ASSERT_LESS_THAN(0, can_send(driver, right_wrong, 2));
-    rig_assert_nothing_waits();
-    rig_assert_no_echo();
+    rig_assert_idle();
 }
 
 TEST(test_pair_without_a_place_for_right_accepts_left_only) {
@@ -260,8 +259,7 @@ TEST(test_old_frame_failed_during_its_replacement_is_not_sent) {
 
 static void join_again(void) {
     TEST_ASSERT_EQUAL(IW_BUS_DOWN, can_bus_state(driver));
-    (void)can_bus_state(driver);
-    rig_assert_active_after(0, 11);
+    rig_assert_joins(0);
 }
 
 TEST(test_frame_that_never_ends_has_a_bounded_wait) {
@@ -270,8 +268,7 @@ TEST(test_frame_that_never_ends_has_a_bounded_wait) {
     TEST_ASSERT_EQUAL(0, rig_send(266, 2));
     end_frame_on_bus(MODEL_BIT_ERROR);
     rig_serve(0);
-    rig_assert_nothing_waits();
-    rig_assert_no_echo();
+    rig_assert_idle();
     assert_sent(266, 3);
 }
 
@@ -284,8 +281,7 @@ TEST(test_purge_that_does_not_end_resets_the_controller) {
     TEST_ASSERT_EQUAL_HEX32_MESSAGE(0, rig[0].reset, "the device is let go again");
     TEST_ASSERT_LESS_THAN(0, rig_send(266, 2));
     join_again();
-    rig_assert_nothing_waits();
-    rig_assert_no_echo();
+    rig_assert_idle();
     assert_sent(266, 3);
 }
 
@@ -322,8 +318,7 @@ TEST(test_purge_on_a_dominant_bus_leaves_no_frame) {
     TEST_ASSERT_EQUAL(1, can_purge(driver));
     TEST_ASSERT_EQUAL(0, driver->resets);
     rig_assert_active_after(0, 11);
-    rig_assert_nothing_waits();
-    rig_assert_no_echo();
+    rig_assert_idle();
 }
 
 /// ALST and TERR of an attempt stay readable after the abort of the mailbox. They are no echo, and they do not block
@@ -364,8 +359,7 @@ TEST(test_purge_aborts_all_frames) {
     (void)rig_send(266, 1);
     (void)rig_send(298, 1);
     TEST_ASSERT_EQUAL(1, can_purge(driver));
-    rig_assert_nothing_waits();
-    rig_assert_no_echo();
+    rig_assert_idle();
     assert_sent(266, 2);
 }
 
@@ -389,8 +383,7 @@ TEST(test_frame_completed_during_a_purge_has_no_echo) {
     begin_first();
     rig[0].on_read = send_frame_at_poll;
     TEST_ASSERT_EQUAL(1, can_purge(driver));
-    rig_assert_no_echo();
-    rig_assert_nothing_waits();
+    rig_assert_idle();
     assert_sent(266, 2);
 }
 
@@ -433,8 +426,7 @@ TEST(test_purge_while_a_frame_completes_leaves_no_echo_or_frame) {
     fill_mailboxes();
     rig[0].on_read = send_right_at_masking;
     TEST_ASSERT_EQUAL(1, can_purge(driver));
-    rig_assert_no_echo();
-    rig_assert_nothing_waits();
+    rig_assert_idle();
     TEST_ASSERT_EQUAL(0, driver->resets);
 }
 
