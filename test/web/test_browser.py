@@ -35,8 +35,8 @@ def browser():
 
 
 @contextlib.contextmanager
-def page_of(rig, size="desk", scheme="light", url=None, **device):
-    """The page, open and live, with its own cookies and storage; anything on its console is an error."""
+def page_of(rig, size="desk", scheme="light", url=None, before=lambda page: None, **device):
+    """The page, open and live, with its own cookies and storage; anything on its console is an error. `before` prepares the empty page."""
     said = []
     context = browser().new_context(viewport=dict(zip(("width", "height"), SIZES[size], strict=False)), color_scheme=scheme, accept_downloads=True, **device)
     try:
@@ -44,6 +44,7 @@ def page_of(rig, size="desk", scheme="light", url=None, **device):
         page.set_default_timeout(15000)
         page.on("console", lambda message: said.append(message.text) if message.type == "error" and "Failed to load resource" not in message.text else None)
         page.on("pageerror", lambda error: said.append(str(error)))
+        before(page)
         page.goto(url or rig.url)
         page.said = said
         yield page
@@ -706,11 +707,162 @@ def test_stop_never_leaves_the_screen_by_zoom_or_size(rig):
             press_stop(page, rig)
 
 
+def confirm_estop(page, rig):
+    """Confirms the e-stop while a client drives: whether it is delivered or not, the wheels brake. Returns what the page then shows."""
+    driver = Driver(rig)
+    page.click("#estop-ask")
+    since = now_us()
+    page.click("#ask-yes")
+    late = braking_ms(rig, since)
+    assert late < 1000, f"{late} ms"
+    driver.end()
+    driver.client.close()
+    rig.at_standstill()
+    return seen(page, "document.querySelector('#delivered').className === 'bad' && document.querySelector('#delivered').textContent")
+
+
 def test_stop_never_needs_the_token_or_the_login(rig):
     rig.start().connected()
     with page_of(rig, "phone", url=rig.url.split("#")[0]) as page:
         page.wait_for_selector("#login:not([hidden])")
         press_stop(page, rig)
+        assert "NOT LATCHED" in confirm_estop(page, rig)
+        press_stop(page, rig)
+        seen(page, "document.querySelector('#delivered').textContent.startsWith('Stop delivered: ')")
+
+
+def refuse_without_a_message(page):
+    page.route("**/api/estop", lambda route: route.fulfill(status=409, body='{"ok":false}'))
+
+
+def answer_with_null(page):
+    page.route("**/api/estop", lambda route: route.fulfill(body="null"))
+
+
+def answer_no_challenge(page):
+    page.route("**/api/challenge", lambda route: None)
+    page.evaluate("proof.session = null")
+
+
+def replace_the_token(page):
+    page.evaluate("setToken('0'.repeat(32))")
+
+
+def forbid_cryptography(page):
+    """As a browser does on http of another machine."""
+    page.evaluate("Object.defineProperty(crypto, 'subtle', { value: undefined }); proof.session = null")
+
+
+@pytest.mark.parametrize("trouble", [refuse_without_a_message, answer_with_null, answer_no_challenge, replace_the_token, forbid_cryptography])
+def test_stop_acts_while_an_estop_is_not_delivered(rig, trouble):
+    with live_page(rig, "phone") as page:
+        trouble(page)
+        assert "NOT LATCHED" in confirm_estop(page, rig)
+        for _ in range(2):
+            press_stop(page, rig)
+        page.unroute_all(behavior="ignoreErrors")
+        page.said.clear()
+
+
+def test_stop_and_estop_are_both_repeated_until_delivered(rig):
+    with live_page(rig, "phone") as page:
+        rig.kill_gateway(signal.SIGKILL)
+        page.click("#stop")
+        seen(page, "document.querySelector('#delivered').textContent.startsWith('NOT DELIVERED')")
+        page.click("#estop-ask")
+        page.click("#ask-yes")
+        page.click("#stop")
+        rig.start_gateway()
+        seen(page, "document.querySelector('#delivered').textContent.startsWith('Stop delivered: ')")
+        assert until(lambda: rig.ask_json("GET", "/api/status")[1].get("cause"), what="it is latched") == "estop_software"
+
+
+def test_stop_refused_without_a_message_is_repeated(rig):
+    with live_page(rig, "phone") as page:
+        page.route("**/api/stop", lambda route: route.fulfill(status=409, body='{"ok":false}'), times=1)
+        driver = Driver(rig)
+        assert brakes_ms(rig, lambda: page.keyboard.press("s")) < 1500
+        seen(page, "document.querySelector('#delivered').textContent.startsWith('Stop delivered: ')")
+        driver.end()
+
+
+def test_stop_reaches_the_bridge_when_every_connection_is_taken(rig):
+    with live_page(rig, "phone") as page:
+        page.evaluate("Array.from({ length: 6 }, () => askJson('/api/events').catch(() => null)); 0")
+        time.sleep(0.5)
+        driver = Driver(rig)
+        assert brakes_ms(rig, lambda: page.keyboard.press("s")) < 1500
+        driver.end()
+
+
+SLOW = """const slow = globalThis.fetch; globalThis.fetch = (path, options) => path !== "/api/stop" ? slow(path, options)
+  : new Promise((done, failed) => { setTimeout(() => slow(path, options).then(done, failed), 700); options.signal.addEventListener("abort", () => failed(options.signal.reason)); })"""
+
+
+def test_stop_on_a_slow_network_is_delivered(rig):
+    """The request leaves 0.7 s after it was made, as on a network that needs so long for a new connection."""
+    with live_page(rig, "phone") as page:
+        page.evaluate(SLOW)
+        driver = Driver(rig)
+        assert brakes_ms(rig, lambda: page.keyboard.press("s")) < 1500
+        seen(page, "document.querySelector('#delivered').textContent.startsWith('Stop delivered: ')")
+        driver.end()
+
+
+NO_STORAGE = "Object.defineProperty(globalThis, 'localStorage', { get() { throw new DOMException('denied', 'SecurityError'); } })"
+SCRIPTS = ["uPlot.iife.min.js", *(f"{name}.js" for name in ("proof", "plots", "recordings", "mcap", "link", "state", "drive", "player", "page"))]
+
+
+def test_stop_acts_although_a_script_of_the_page_is_missing(rig):
+    rig.start().connected()
+    for script in SCRIPTS:
+        with page_of(rig, "phone", before=lambda page: page.route(f"**/{script}", lambda route: route.abort())) as page:
+            page.evaluate("new Promise((done) => requestAnimationFrame(done))")
+            press_stop(page, rig)
+            page.said.clear()
+
+
+def test_stop_acts_without_storage_and_in_an_old_browser(rig):
+    rig.start().connected()
+    for lacks in (NO_STORAGE, "delete AbortSignal.timeout", "delete AbortSignal.timeout; delete globalThis.visualViewport"):
+        with page_of(rig, "phone", before=lambda page: page.add_init_script(lacks)) as page:
+            if lacks is NO_STORAGE:
+                live(page)
+            driver = Driver(rig)
+            assert brakes_ms(rig, lambda: page.dispatch_event("#stop", "click", {"detail": 1})) < 1000, lacks
+            driver.end()
+            driver.client.close()
+            rig.at_standstill()
+            page.said.clear()
+
+
+def test_key_s_stops_wherever_the_focus_is_apart_from_the_token(rig):
+    with live_page(rig) as page:
+        for selector in ("#units", "#files", "#estop-ask"):
+            page.focus(selector)
+            page.evaluate("document.dispatchEvent(new Event('keydown')); showResult('')")  # As a browser that fills in a form.
+            page.keyboard.press("s")
+            seen(page, "document.querySelector('#delivered').textContent.startsWith('Stop delivered: ')")
+        page.click("#forget")
+        page.evaluate("showResult('')")
+        page.fill("#token", "")
+        page.focus("#token")
+        page.keyboard.press("s")
+        assert page.input_value("#token") == "s" and page.inner_text("#delivered") == ""
+
+
+def test_stop_acts_after_back_while_a_stop_was_not_delivered(rig):
+    with live_page(rig, "phone") as page:
+        rig.web.signal(signal.SIGKILL)
+        page.click("#stop")
+        seen(page, "document.querySelector('#delivered').textContent.startsWith('NOT DELIVERED')")
+        page.goto("about:blank")
+        rig.web.wait(2)
+        rig.start_web()
+        page.go_back()
+        live(page)
+        press_stop(page, rig)
+        page.said.clear()
 
 
 def test_delivered_goes_with_the_next_state(rig):

@@ -98,12 +98,12 @@ function release(why) {
   if (!drive.held) return;
   drive.held = false;
   drive.session++;
+  deliver("stop");
   drive.pointer = null;
   drive.keys.clear();
   $("pad").classList.remove("held");
   aim(0, 0);
   padSays(fill(STRINGS.pad_stopped, { why }));
-  deliver("stop");
 }
 
 function letGo(name) {

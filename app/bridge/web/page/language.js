@@ -2,7 +2,13 @@
 "use strict";
 // The language of the page: as chosen here; otherwise the first of the browser's (Accept-Language) that exists; otherwise English.
 
-const LANGUAGE = [localStorage.getItem("language"), ...navigator.languages.map((one) => one.split("-")[0]), "en"].find((one) => Object.hasOwn(LANGUAGES, one));
+// A browser may forbid the page to store anything, with an exception.
+const storage = {
+  read(name) { try { return localStorage.getItem(name); } catch { return null; } },
+  write(name, value) { try { localStorage.setItem(name, value); } catch { /* It then lasts as long as the page. */ } },
+};
+
+const LANGUAGE = [storage.read("language"), ...navigator.languages.map((one) => one.split("-")[0]), "en"].find((one) => Object.hasOwn(LANGUAGES, one));
 const STRINGS = LANGUAGES[LANGUAGE];
 document.documentElement.lang = LANGUAGE;
 
@@ -26,7 +32,7 @@ function choose(select, options, value, changed) {
 
 function setUpLanguage(select) {
   choose(select, Object.entries(LANGUAGES).map(([key, strings]) => [key, strings.language_name]), LANGUAGE, (key) => {
-    localStorage.setItem("language", key);
+    storage.write("language", key);
     location.reload();
   });
 }

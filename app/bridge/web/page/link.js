@@ -2,9 +2,8 @@
 "use strict";
 // The bridge: requests to it, and the one stream of its events.
 
-const $ = (id) => document.getElementById(id);
 const STALE_MS = 1000, ASK_MS = 1000;
-const page = { state: null, received_ms: 0, gateway: null, stream: null, wait: 500, rights: {}, t_us: 0, frozen: false, recording: null, stop: null, newest: null, delivered: null };
+const page = { state: null, received_ms: 0, gateway: null, stream: null, wait: 500, rights: {}, t_us: 0, frozen: false, recording: null, stop: null, newest: null, reads: new AbortController() };
 
 async function ask(method, path, options) {
   const answer = await askProved(method, path, options);
@@ -12,13 +11,15 @@ async function ask(method, path, options) {
   return answer;
 }
 
-// STOP needs no proof, and waits for none.
-function askStop(options) {
-  return fetch("/api/stop", { method: "POST", cache: "no-store", credentials: "omit", ...options });
+// Ends what has no time limit: it may use the last connection that the browser allows.
+function freeConnections() {
+  page.stream?.abort();
+  page.reads.abort();
+  page.reads = new AbortController();
 }
 
 async function askJson(path) {
-  const answer = await ask("GET", path);
+  const answer = await ask("GET", path, { signal: page.reads.signal });
   const body = await answer.json();
   if (!answer.ok) throw new Error(body.message ?? answer.status);
   return body;

@@ -28,10 +28,9 @@ function setUp() {
   $("pose").setAttribute("aria-label", STRINGS.pose_label);
   $("at").setAttribute("aria-label", STRINGS.player_label);
   $("source").textContent = STRINGS.source_live;
-  setUpStop();
   setUpDriving();
   setUpLanguage($("language"));
-  choose($("units"), Object.keys(UNITS).map((one) => [one, one]), unit, (one) => { unit = one; localStorage.setItem("units", one); show(); });
+  choose($("units"), Object.keys(UNITS).map((one) => [one, one]), unit, (one) => { unit = one; storage.write("units", one); show(); });
   $("forget").addEventListener("click", () => { setToken(""); askToken(); });
   $("last-stop").addEventListener("click", () => { document.querySelector("#stops [aria-expanded='false']")?.click(); });
   $("freeze").addEventListener("click", freeze);

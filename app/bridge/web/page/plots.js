@@ -35,7 +35,7 @@ async function inSteps(work, progress = () => {}) {
     if (done) return value;
     if (performance.now() - begun < STEP_MS) continue;
     progress(value);
-    if (deliver.busy) await new Promise((turn) => setTimeout(turn, 50)); // Until the gateway has answered, STOP needs several turns.
+    if (stopIsOpen()) await new Promise((turn) => setTimeout(turn, 50)); // Until the gateway has answered, STOP needs several turns.
     await new Promise((turn) => {
       const { port1, port2 } = new MessageChannel(); // A timer waits longer, above all in a hidden page.
       port1.onmessage = () => { port1.close(); turn(); };

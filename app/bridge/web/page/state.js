@@ -93,7 +93,7 @@ function inOneWord(state) {
 }
 
 const UNITS = { "m/s": (mm_s) => (mm_s / 1000).toFixed(2), "km/h": (mm_s) => (mm_s * 0.0036).toFixed(1) };
-let unit = Object.hasOwn(UNITS, localStorage.getItem("units")) ? localStorage.getItem("units") : "m/s";
+let unit = Object.hasOwn(UNITS, storage.read("units")) ? storage.read("units") : "m/s";
 
 // No sign before a zero.
 const plain = (words) => words.replace(/^-(0(\.0*)?)$/, "$1");

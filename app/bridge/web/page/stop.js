@@ -1,8 +1,101 @@
 // SPDX-License-Identifier: MIT
 "use strict";
 // STOP, the control that latches, reset, and the confirmation of an action that cannot be undone.
+// STOP needs no other script, so it acts although one is missing or fails.
 
-const STOP_TRY_MS = 400;
+const $ = (id) => document.getElementById(id);
+
+// A request is repeated every STOP_AGAIN_MS, and lasts longer: on a slow network its answer comes late. Those of both verbs fit
+// into the six connections of a browser. STOP_GAP_MS: fingers that drum on the button do not fill them.
+const STOP_AGAIN_MS = 400, STOP_LIFE_MS = 1200, STOP_GAP_MS = 200;
+const STOPS = {
+  stop: (options) => fetch("/api/stop", { method: "POST", cache: "no-store", credentials: "omit", ...options }), // Needs no proof, and waits for none.
+  estop: (options) => ask("POST", "/api/estop", options),
+};
+
+// By verb, what a person has pressed: {done: executed, refused: needs the token, times: attempts, ms: of the last one, why: not delivered, state: in the answer}.
+const orders = {};
+const isOpen = (one) => one !== undefined && !one.done && !one.refused;
+const stopIsOpen = () => Object.values(orders).some(isOpen);
+
+// A press sends a request immediately: it waits for no earlier one, whose answer may never come.
+// The control that latches needs the token, and more of this page and of the browser: STOP always goes with it.
+function deliver(verb) {
+  if (!isOpen(orders.estop)) delete orders.estop;
+  order("stop");
+  if (verb === "estop") order("estop");
+  showOrders();
+}
+
+function order(verb) {
+  const one = isOpen(orders[verb]) ? orders[verb] : { done: false, refused: false, times: 0, ms: -STOP_GAP_MS, why: null, state: null };
+  if (performance.now() - one.ms < STOP_GAP_MS) return;
+  orders[verb] = one;
+  clearInterval(one.timer);
+  one.timer = setInterval(() => repeat(verb, one), STOP_AGAIN_MS);
+  attempt(verb, one);
+}
+
+function repeat(verb, one) {
+  attempt(verb, one);
+  one.why ??= STRINGS.no_answer;
+  showOrders();
+  freeConnections();
+}
+
+async function attempt(verb, one) {
+  one.times++;
+  one.ms = performance.now();
+  const control = new AbortController();
+  setTimeout(() => control.abort(), STOP_LIFE_MS); // Some browsers have no AbortSignal.timeout.
+  try {
+    const answer = await STOPS[verb]({ signal: control.signal, keepalive: true });
+    const { state, error, message = STRINGS.no_answer } = await answer.json();
+    if (!isOpen(one)) return;
+    Object.assign(one, { done: answer.ok, refused: verb === "estop" && error === "bad_token", state, why: answer.ok ? null : String(message) });
+  } catch {
+    if (!isOpen(one)) return;
+    one.why = STRINGS.no_answer;
+  }
+  if (!isOpen(one)) clearInterval(one.timer);
+  showOrders();
+}
+
+// Shows NOT DELIVERED until the gateway has answered.
+function showOrders() {
+  const { stop, estop } = orders;
+  if (estop?.done) showDelivered(estop);
+  else if (!stop.done && stop.why) showMissed(STRINGS.not_delivered, say("not_delivered_why", { ...stop, why: stop.why.replace(`${STRINGS.not_delivered}: `, "") }));
+  else if (stop.done && estop?.why) showMissed(STRINGS.not_latched, say(estop.refused ? "not_latched_token" : "not_delivered_why", estop));
+  else if (stop.done && !estop) showDelivered(stop);
+  else showResult(STRINGS.stopping_now);
+}
+
+let shown = null; // The answer that is shown: it disappears with the next state.
+
+function showDelivered({ state }) {
+  showResult(fill(STRINGS.delivered, { state: STRINGS.states[state] ?? state }), "good");
+  shown = { state, seen: false, ms: performance.now() };
+}
+
+function forgetDelivered({ state }) {
+  if (!shown) return;
+  if (state === shown.state) shown.seen = true;
+  else if (shown.seen || performance.now() - shown.ms > 1000) showResult("");
+}
+
+function showResult(words, tone = "") {
+  shown = null;
+  $("delivered").className = tone;
+  $("delivered").textContent = words;
+}
+
+function showMissed(words, why) {
+  const small = document.createElement("small");
+  small.textContent = why;
+  showResult(words, "bad");
+  $("delivered").append(small);
+}
 
 // Requests one confirmation of an action that cannot be undone.
 // Not modal: a modal dialog would make STOP inert. STOP answers it with no.
@@ -19,53 +112,6 @@ function confirmed(text, yes) {
     $("ask-no").onclick = () => dialog.close();
     dialog.onclose = () => { done(false); dialog.onclose = null; before?.focus(); };
   });
-}
-
-// Repeats the request until the gateway answers, and shows NOT DELIVERED until then. The second control replaces a stop that is
-// not delivered yet, never the other way round.
-async function deliver(name) {
-  deliver.verb = deliver.busy && deliver.verb === "estop" ? "estop" : name;
-  if (deliver.busy) return;
-  deliver.busy = true;
-  let times = 0, why = "";
-  showResult(STRINGS.stopping_now);
-  for (;;) {
-    times++;
-    const asked = deliver.verb;
-    try {
-      const options = { signal: AbortSignal.timeout(STOP_TRY_MS), keepalive: true };
-      const answer = await (asked === "stop" ? askStop(options) : ask("POST", "/api/estop", options));
-      const body = await answer.json();
-      if (answer.ok) {
-        showResult(fill(STRINGS.delivered, { state: STRINGS.states[body.state] ?? body.state }), "good");
-        page.delivered = { state: body.state, seen: false, ms: performance.now() };
-        if (asked === deliver.verb) break;
-        continue;
-      }
-      why = body.message;
-      if (answer.status === 401) { notDelivered(why, times); break; }
-    } catch {
-      why = STRINGS.no_answer;
-    }
-    notDelivered(why.replace(`${STRINGS.not_delivered}: `, ""), times);
-    page.stream?.abort(); // It may use the last connection that the browser allows.
-    await new Promise((done) => setTimeout(done, STOP_TRY_MS / 2));
-  }
-  deliver.busy = false;
-}
-
-// The result of a stop disappears with the next state.
-function forgetDelivered(state) {
-  const said = page.delivered;
-  if (!said) return;
-  if (state.state === said.state) said.seen = true;
-  else if (said.seen || performance.now() - said.ms > 1000) showResult("");
-}
-
-function showResult(words, tone = "") {
-  page.delivered = null;
-  $("delivered").className = tone;
-  $("delivered").textContent = words;
 }
 
 // The page is not zoomed by touch (page.css), but some browsers zoom every page: the bar then stays at its size and place, measured from its lower edge.
@@ -87,19 +133,19 @@ function makeRoomForStop() {
 }
 
 function setUpStop() {
-  const press = () => { letGo("why_let_go"); deliver("stop"); $("ask").close(); };
+  const press = () => { deliver("stop"); letGo("why_let_go"); $("ask").close(); };
   $("stop").addEventListener("pointerdown", press); // On touch, not when the finger is lifted.
-  $("stop").addEventListener("click", (event) => { if (event.detail === 0) press(); }); // Enter, or a screen reader.
+  $("stop").addEventListener("click", press); // Enter, a screen reader, a browser without pointer events; also after each pointerdown.
   $("estop-ask").addEventListener("click", async () => { if (await confirmed(STRINGS.ask_estop, STRINGS.ask_estop_yes)) deliver("estop"); });
   $("reset").addEventListener("click", async () => {
     const stop = page.stop; // The stop that the person sees: a later one is not cleared.
     if (await confirmed(STRINGS.ask_reset, STRINGS.ask_reset_yes)) reset(stop);
   });
   document.addEventListener("keydown", (event) => {
-    const typing = event.target.matches("input, select") && event.target.type !== "range";
-    if (event.key.toLowerCase() === "s" && !typing && !event.ctrlKey && !event.metaKey && !event.altKey && !event.repeat) press();
+    if (event.key?.toLowerCase() === "s" && event.target !== $("token") && !event.ctrlKey && !event.metaKey && !event.altKey && !event.repeat) press();
     if (event.key === "Escape") $("ask").close();
   });
+  $("bar").hidden = false; // Only now: no STOP is shown that does not act.
   visualViewport.addEventListener("resize", keepStopInSight);
   visualViewport.addEventListener("scroll", keepStopInSight);
   new ResizeObserver(makeRoomForStop).observe($("bar"));
@@ -116,7 +162,4 @@ async function reset(stop) {
   }
 }
 
-function notDelivered(why, times) {
-  showResult(STRINGS.not_delivered, "bad");
-  $("delivered").append(element("small", { text: fill(STRINGS.not_delivered_why, { why, times }) }));
-}
+setUpStop();

@@ -107,6 +107,8 @@
   unknown: "unbekannt",
   not_delivered: "NICHT ZUGESTELLT",
   not_delivered_why: "{why}. Bisher {times} Mal versucht, weitere Versuche folgen. Nehmen Sie das Gerät, das den Strom abschaltet.",
+  not_latched: "Halt zugestellt, NICHT GESPERRT",
+  not_latched_token: "Diese Seite hat kein gültiges Token, und Sperren braucht es. Nehmen Sie das Gerät, das den Strom abschaltet.",
   stopping_now: "Halt gesendet, warte auf Antwort …",
   delivered: "Halt zugestellt: Das Gateway meldet „{state}“.",
   refused: "Abgelehnt: {why}",

@@ -108,6 +108,8 @@
   unknown: "unknown",
   not_delivered: "NOT DELIVERED",
   not_delivered_why: "{why}. Attempts so far: {times}; the page tries again. Use the device that cuts the power.",
+  not_latched: "Stop delivered, NOT LATCHED",
+  not_latched_token: "This page has no valid token, and latching needs it. Use the device that cuts the power.",
   stopping_now: "Stop sent, waiting for the answer …",
   delivered: "Stop delivered: the gateway reports “{state}”.",
   refused: "Refused: {why}",
