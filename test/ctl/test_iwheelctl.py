@@ -242,6 +242,16 @@ class Showing(WithGateway):
         self.assertIn("CONTRADICTED  mount_sign_left = no: the operator found yes; disabled: arm is", out)
         self.assertNotIn("ready:", out)
 
+    def test_wheels_that_turn_are_not_ready(self):
+        for state in ("listening", "latched"):
+            out = self.show(snapshot(state, rolling=True, left=wheel(281), right=wheel(281)))
+            self.assertRegex(out, rf"STATE +{state}, rolling\nnext +a wheel turns although the gateway sends nothing")
+            self.assertNotIn("ready:", out)
+        for side in ("left", "right"):
+            out = self.show(snapshot(rolling=False, **{side: wheel(60)}))
+            self.assertIn("next          cannot arm: a wheel turns;", out)
+            self.assertNotIn("ready:", out)
+
     def test_memory_is_shown_when_it_does_not_work(self):
         self.assertNotIn("STORED", self.show(snapshot(memory={"file": "/x/ledger-can0", "state": "kept", "reason": None})))
         out = self.show(snapshot(memory={"file": "/x/ledger-can0", "state": "failed", "reason": "No space left on device"}))

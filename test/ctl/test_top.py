@@ -181,6 +181,15 @@ class WithWheels(unittest.TestCase):
         top.wait_for("reset refused")
         self.assertEqual(0, top.end())
 
+    def test_machine_that_rolls_away_is_not_listening_and_ready(self):
+        top = self.top(40, 24)
+        top.wait_for("LISTENING")
+        self.rig.sim.ask("slope 10")
+        rows = top.wait_for(" ROLLING ")
+        self.assertIn("hold the machine, or use its parking brake", " ".join(" ".join(rows).split()))
+        self.assertFalse(any("ready:" in row for row in rows), rows)
+        self.assertEqual(0, top.end())
+
     def test_every_size_shows_the_state_and_resizing_does_no_harm(self):
         top = self.full_top()
         for columns, rows in ((60, 24), (40, 12), (20, 4), (10, 2), (200, 60), (30, 24), (80, 10), (80, 24)):

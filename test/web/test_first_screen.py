@@ -65,6 +65,14 @@ def test_state_figures_and_last_stop_are_on_the_first_screen(rig, scheme):
             shot(page, f"latched-{size}-{scheme}")
 
 
+def test_machine_that_rolls_away_is_not_ready(rig):
+    with live_page(rig, "portrait", **touch("portrait")) as page:
+        assert page.inner_text("#word") == "Ready"
+        rig.sim.ask("slope 10")
+        seen(page, "document.querySelector('#word').textContent === 'Rolling' && document.querySelector('#now').dataset.tone === 'bad'")
+        assert "parking brake" in page.inner_text("#sentence") and "ready:" not in page.text_content("#advice")
+
+
 def test_large_figures_are_those_of_the_snapshot(rig):
     with live_page(rig, "portrait", **touch("portrait")) as page:
         driver = Driver(rig, 200)

@@ -111,6 +111,11 @@ static void add_present(const json_t *status, advice_t *self) {
     }
 }
 
+/// Returns true if a wheel that is online is not at standstill.
+static bool turns(const json_t *status, const char *side) {
+    return is_online(status, side) && !json_is_true(json_object_get(json_object_get(status, side), "at_rest"));
+}
+
 static void advise_listening(const json_t *status, advice_t *self) {
     add_present(status, self);
     if (json_is_true(json_object_get(status, "listen_only"))) {
@@ -127,6 +132,9 @@ static void advise_listening(const json_t *status, advice_t *self) {
         add(self, "cannot arm: set track_mm under [wheels]; iwheelctl bringup measures it");
     }
     add_contradictions(status, self);
+    if (self->lines == 0 && (turns(status, "left") || turns(status, "right"))) {
+        add(self, "cannot arm: a wheel turns; wait until both wheels are at standstill");
+    }
     if (self->lines == 0) {
         add(self, "ready: iwheelctl drive LEFT RIGHT (mm/s) arms and MOVES the wheels");
     }
@@ -138,6 +146,10 @@ void advice_collect(const json_t *status, advice_t *out_advice) {
     char fix[ADVICE_SIZE];
     memset(out_advice, 0, sizeof(*out_advice));
     const bool known = advice_fix(status, cause, fix);
+    if (json_is_true(json_object_get(status, "rolling"))) {
+        add(out_advice,
+            "a wheel turns although the gateway sends nothing to it: hold the machine, or use its parking brake");
+    }
     if (strcmp(state, "listening") == 0) {
         advise_listening(status, out_advice);
     } else if (strcmp(state, "armed") == 0) {

@@ -38,6 +38,9 @@ static void draw_state(const paper_t *paper, const json_t *status, const json_t 
     if (json_is_true(get(status, "holding"))) {
         paper_print(paper, TONE_CARE, ", holding");
     }
+    if (json_is_true(get(status, "rolling"))) {
+        paper_print(paper, TONE_BAD, ", rolling");
+    }
     paper_end(paper);
     for (unsigned i = 0; i < advice.lines; i++) {
         paper_wrap(paper, (i == 0) ? "next" : "", TONE_TITLE, advice.line[i]);

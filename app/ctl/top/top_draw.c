@@ -22,8 +22,12 @@ static const json_t *get(const json_t *object, const char *field) {
     return json_object_get(object, field);
 }
 
+static bool rolls(const top_model_t *model) {
+    return json_is_true(get(model->state, "rolling"));
+}
+
 static top_tone_t tone_of(const top_model_t *model, const char *state) {
-    if (!model->connected || model->stale || strcmp(state, "latched") == 0) {
+    if (!model->connected || model->stale || rolls(model) || strcmp(state, "latched") == 0) {
         return TOP_BAD;
     }
     return (strcmp(state, "listening") == 0) ? TOP_GOOD : TOP_CARE;
@@ -34,6 +38,7 @@ static void state_word(const top_model_t *model, char out_word[16]) {
     const char *state = text_word(model->state, "state");
     const char *word = !model->connected                           ? "NO GATEWAY"
                        : (model->stale || model->state == NULL)    ? "NO ANSWER"
+                       : rolls(model)                              ? "ROLLING"
                        : json_is_true(get(model->state, "arming")) ? "ARMING"
                                                                    : state;
     size_t i = 0;
@@ -83,6 +88,9 @@ static int draw_reason(const top_model_t *model, int row, int rows, const advice
         text_integer(get(lease, "remaining_ms"), "ms", left);
         (void)snprintf(text, sizeof text, "%.30s drives (pid %lld); its command is valid for %s",
                        text_word(lease, "name"), json_integer_value(get(lease, "pid")), left);
+    } else if (rolls(model)) {
+        tone = TOP_BAD;
+        (void)snprintf(text, sizeof text, "%s", advice->line[0]);
     } else if (cause != NULL) {
         tone = tone_of(model, text_word(model->state, "state"));
         spell(cause, words, sizeof words);

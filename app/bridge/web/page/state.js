@@ -14,19 +14,26 @@ function presentAdvice(state) {
 
 // The same lines as `iwheelctl status`.
 function advise(state) {
+  return [...(state.rolling ? [STRINGS.next.rolling] : []), ...adviseIn(state)].slice(0, 6);
+}
+
+const turns = (wheel) => wheel.heard && !wheel.at_rest;
+
+function adviseIn(state) {
   const next = STRINGS.next, fix = state.cause ? fixOf(state, state.cause) : null;
   if (state.state === "armed") return [next.armed];
   if (state.state === "stopping" && state.holding) return [next.holding];
   if (state.state === "stopping") return [fix ?? next.stopping];
-  if (state.state === "latched") return [fill(next.latched, { fix: fix ?? next.remove }), ...presentAdvice(state)].slice(0, 6);
+  if (state.state === "latched") return [fill(next.latched, { fix: fix ?? next.remove }), ...presentAdvice(state)];
   if (state.state !== "listening") return [next.newer];
   const lines = presentAdvice(state);
-  if (state.listen_only) return [...lines, next.listen_only].slice(0, 6);
+  if (state.listen_only) return [...lines, next.listen_only];
   for (const item of ["setpoint_type", "current_role", "track"]) if (state.ledger[item]?.evidence === "none" && !state.ledger[item].value) lines.push(next[item]);
   for (const [item, entry] of Object.entries(state.ledger)) {
     if (entry.disabled?.startsWith("arm is refused; ")) lines.push(fill(next.contradicted, { item, cost: entry.disabled.slice(16) }));
   }
-  return (lines.length ? lines : [next.ready]).slice(0, 6);
+  if (!lines.length && !state.rolling) lines.push(turns(state.left) || turns(state.right) ? next.turning : next.ready);
+  return lines;
 }
 
 function text(id, value, tone = "") {
@@ -79,6 +86,7 @@ const capital = (words) => words.charAt(0).toUpperCase() + words.slice(1);
 // The state in one word, its tone, and one sentence with the next action.
 function inOneWord(state) {
   const { word, here, next } = STRINGS, lines = advise(state), first = lines[0];
+  if (state.rolling) return [word.rolling, "bad", next.rolling];
   if (state.state === "latched") {
     const fix = fixOf(state, state.cause) ?? next.remove;
     return [word.latched, "bad", fill(page.rights.may_reset ? here.latched : next.latched, { fix })];

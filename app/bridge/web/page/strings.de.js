@@ -24,7 +24,7 @@
   big_battery: "Akku",
   big_estop: "Not-Halt",
   word: {
-    unknown: "Unbekannt", ready: "Bereit", not_ready: "Nicht bereit", watching: "Beobachtet", arming: "Wird scharf", armed: "Fährt", stopping: "Hält an", holding: "Hält",
+    unknown: "Unbekannt", rolling: "Rollt", ready: "Bereit", not_ready: "Nicht bereit", watching: "Beobachtet", arming: "Wird scharf", armed: "Fährt", stopping: "Hält an", holding: "Hält",
     latched: "Gesperrt",
   },
   here: {
@@ -197,6 +197,8 @@
   state_holding: "{state}, hält",
   states: { listening: "bereit", armed: "fährt", stopping: "hält an", latched: "gesperrt" },
   next: {
+    rolling: "ein Rad dreht sich, obwohl das Gateway ihm nichts sendet: Maschine festhalten oder ihre Feststellbremse ziehen",
+    turning: "nicht bereit: Ein Rad dreht sich; warten, bis beide Räder stehen",
     armed: "die Räder folgen dem, der fährt; iwheelctl stop beendet das",
     stopping: "warten, bis beide Räder stehen, dann neu scharf schalten",
     holding: "Nullen halten die Räder; beenden mit iwheelctl release (die Maschine kann dann rollen) oder neu scharf schalten",

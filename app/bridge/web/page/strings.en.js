@@ -25,7 +25,7 @@
   big_battery: "Battery",
   big_estop: "E-stop",
   word: {
-    unknown: "Unknown", ready: "Ready", not_ready: "Not ready", watching: "Watching", arming: "Arming", armed: "Driving", stopping: "Stopping", holding: "Holding",
+    unknown: "Unknown", rolling: "Rolling", ready: "Ready", not_ready: "Not ready", watching: "Watching", arming: "Arming", armed: "Driving", stopping: "Stopping", holding: "Holding",
     latched: "Latched",
   },
   here: {
@@ -198,6 +198,8 @@
   state_holding: "{state}, holding",
   states: { listening: "listening", armed: "armed", stopping: "stopping", latched: "latched" },
   next: {
+    rolling: "a wheel turns although the gateway sends nothing to it: hold the machine, or use its parking brake",
+    turning: "cannot arm: a wheel turns; wait until both wheels are at standstill",
     armed: "the wheels follow the lease holder; iwheelctl stop ends that",
     stopping: "wait until both wheels are at standstill, then arm again",
     holding: "zeros hold the wheels; to end that: iwheelctl release, and the machine may roll; or arm again",
