@@ -15,7 +15,7 @@ INCLUDE = re.compile(r'^#include "([^"]+)"', re.MULTILINE)
 def listed_tests():
     """{name: [sources]} of the lines iwheel_unit_test(name sources...) that consist of plain words after the variables of set() are replaced."""
     text = re.sub(r"foreach\(.*?endforeach\(\)", "", (UNIT / "CMakeLists.txt").read_text(), flags=re.DOTALL)
-    for name, value in re.findall(r"set\((\w+) ([^)]*)\)", text):
+    for name, value in reversed(re.findall(r"set\((\w+) ([^)]*)\)", text)):  # A value may contain an earlier one.
         text = text.replace("${" + name + "}", value)
     return {name: [(UNIT / source).resolve() for source in sources.split()] for name, sources in re.findall(r"iwheel_unit_test\((\w+) ([^)$]*)\)", text)}
 
