@@ -20,7 +20,7 @@ def environment(*without, **more):
 
 
 def start(*words, **more):
-    """In the background; its output is nobody's."""
+    """In the background; its output is discarded."""
     return subprocess.Popen([program(), *words], **{"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, **more})
 
 
