@@ -38,7 +38,7 @@ static int flags_after_a_flood(int writer) {
     bridge_service_open(&service);
     (void)alarm(10); // Ends this program if a line waits.
     for (int i = 0; i < 20000; i++) {
-        (void)fprintf(stderr, "iwheel: line %d of an unread log\n", i);
+        (void)fprintf(stderr, "iwheel: line %d of a log that has no reader\n", i);
     }
     (void)alarm(0);
     (void)dup2(saved, STDERR_FILENO);
