@@ -109,6 +109,7 @@ static IW_APART void record_stop(iw_permit_t *self, const iw_event_t *event, iw_
     stop->cause = event->cause;
     stop->from = iw_permit_state(self);
     stop->sides = event->sides;
+    stop->first = iw_refuse_latched(self) ? stop->first : event->cause;
     stop->latched = false;
     stop->at_once = is_at_once(event);
 }
@@ -130,18 +131,20 @@ static void brake_after(iw_permit_t *self, iw_cause_t cause, iw_time_us_t now_us
     brake(self, &event, now_us);
 }
 
-/// From LISTENING no zeros are sent: the core does not move the wheels, and another master may drive them.
+/// If nothing is being sent, no zeros are sent either: the core does not move the wheels, and another master may drive
+/// them.
 static void latch(iw_permit_t *self, const iw_event_t *event, iw_time_us_t now_us) {
     record_stop(self, event, now_us);
     self->stop.latched = true;
-    const bool was_listening = self->phase == IW_PHASE_LISTENING;
+    const bool was_silent = iw_permit_demand(self) == IW_DEMAND_SILENCE;
     end_arming(self, (iw_refusal_t)iw_cause_rows[event->cause].refusal);
-    self->phase = was_listening ? IW_PHASE_LATCHED : IW_PHASE_CUT;
+    self->phase = was_silent ? IW_PHASE_LATCHED : IW_PHASE_CUT;
     // The client that released the hold before did not know of this latch.
     self->until_release = self->latch_until_release;
     self->at_once = is_at_once(event);
     self->hold_us = now_us;
     self->holder = IW_CLIENT_NONE;
+    self->blocked = IW_CLIENT_NONE;
 }
 
 /// ARMING and RESTARTING send only zeros, so a fault there refuses arm and needs no latch.
@@ -187,9 +190,20 @@ static void stop_holder(iw_permit_t *self, const iw_event_t *event, iw_time_us_t
     }
 }
 
-/// LATCHED retains its first cause, because later causes are mostly consequences of it.
+/// Returns true for an e-stop that begins. A bounce of the button, or another request within the time of an event,
+/// belongs to the one before. Contacts that disagree are a fault, not a press.
+static bool is_new_estop(const iw_permit_t *self, iw_cause_t cause, iw_time_us_t now_us) {
+    return (cause == IW_CAUSE_ESTOP_LINE || cause == IW_CAUSE_ESTOP_SOFTWARE) &&
+           iw_age_us(self->seen_us[cause], now_us) >= IW_PERMIT_EVENT_US;
+}
+
+/// LATCHED retains its cause, because later causes are mostly consequences of it. Only an e-stop is a stop of its own:
+/// otherwise a person who knows only the earlier stop could reset it.
 void iw_permit_raise(iw_permit_t *self, const iw_event_t *event, iw_time_us_t now_us) {
     const iw_cause_t cause = event->cause;
+    if (is_new_estop(self, cause, now_us)) {
+        latch(self, event, now_us);
+    }
     self->raised |= IW_CAUSE_BIT(cause);
     self->seen_us[cause] = now_us;
     self->quiet = false;
@@ -336,7 +350,7 @@ iw_refusal_t iw_permit_arm(iw_permit_t *self, iw_time_us_t now_us, iw_client_t c
         // Arm does not extend the lease; only drive commands do.
         return IW_REFUSE_NONE;
     }
-    const iw_refusal_t refusal = iw_refuse_arm(self, now_us, takeover);
+    const iw_refusal_t refusal = iw_refuse_arm(self, now_us, client, takeover);
     if (refusal != IW_REFUSE_NONE) {
         return refusal;
     }

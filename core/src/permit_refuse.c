@@ -12,10 +12,6 @@ bool iw_refuse_not_followed(iw_cause_t cause) {
     return cause == IW_CAUSE_WHEEL_BLOCKED || cause == IW_CAUSE_PAIR_DIVERGES;
 }
 
-bool iw_refuse_latched(const iw_permit_t *self) {
-    return self->phase >= IW_PHASE_CUT;
-}
-
 static iw_refusal_t refuse_present(const iw_permit_t *self, iw_time_us_t now_us) {
     return iw_cause_refusal(iw_permit_present(self, now_us));
 }
@@ -57,9 +53,19 @@ static iw_refusal_t refuse_sending(const iw_permit_t *self, iw_time_us_t now_us)
     return (self->phase == IW_PHASE_RESTARTING) ? IW_REFUSE_CAUSE_PRESENT : IW_REFUSE_NONE;
 }
 
-static iw_refusal_t refuse_lease(const iw_permit_t *self, iw_time_us_t now_us, bool takeover) {
+/// Returns true until the zeros after a stop have had their time. Until BRAKING becomes HOLDING the output is not zero,
+/// which refuses arm.
+static bool is_hold_due(const iw_permit_t *self, iw_time_us_t now_us) {
+    return self->phase == IW_PHASE_HOLDING &&
+           iw_age_us(self->hold_us, now_us) < self->config->zero_hold_ms * IW_US_PER_MS;
+}
+
+static iw_refusal_t refuse_lease(const iw_permit_t *self, iw_time_us_t now_us, iw_client_t client, bool takeover) {
     if (self->holder != IW_CLIENT_NONE && (!takeover || iw_permit_arming(self))) {
         return IW_REFUSE_BUSY;
+    }
+    if (self->blocked == client && is_hold_due(self, now_us)) {
+        return (iw_refusal_t)iw_cause_rows[self->stop.cause].refusal;
     }
     if (stale_command(self, now_us)) {
         return IW_REFUSE_STALE_COMMAND;
@@ -74,9 +80,9 @@ static iw_refusal_t refuse_lease(const iw_permit_t *self, iw_time_us_t now_us, b
     return IW_REFUSE_NONE;
 }
 
-iw_refusal_t iw_refuse_arm(const iw_permit_t *self, iw_time_us_t now_us, bool takeover) {
+iw_refusal_t iw_refuse_arm(const iw_permit_t *self, iw_time_us_t now_us, iw_client_t client, bool takeover) {
     const iw_refusal_t sending = refuse_sending(self, now_us);
-    return (sending != IW_REFUSE_NONE) ? sending : refuse_lease(self, now_us, takeover);
+    return (sending != IW_REFUSE_NONE) ? sending : refuse_lease(self, now_us, client, takeover);
 }
 
 /// In ARMED only the holder drives, and only while the lease lasts, even if no step has ended it yet.
@@ -92,16 +98,11 @@ static iw_refusal_t refuse_holder(const iw_permit_t *self, iw_time_us_t sent_us,
 }
 
 iw_refusal_t iw_refuse_drive(const iw_permit_t *self, iw_time_us_t sent_us, iw_client_t client) {
-    const bool blocked = self->blocked == client;
-    const bool diverged = self->stop.cause == IW_CAUSE_PAIR_DIVERGES;
     switch (iw_permit_state(self)) {
     case IW_STATE_LATCHED:
         return refuse_latched(refuse_present(self, sent_us));
     case IW_STATE_STOPPING:
-        if (!blocked) {
-            return IW_REFUSE_NOT_ARMED;
-        }
-        return diverged ? IW_REFUSE_PAIR_DIVERGES : IW_REFUSE_WHEEL_BLOCKED;
+        return (self->blocked == client) ? (iw_refusal_t)iw_cause_rows[self->stop.cause].refusal : IW_REFUSE_NOT_ARMED;
     case IW_STATE_ARMED:
         return refuse_holder(self, sent_us, client);
     case IW_STATE_LISTENING:

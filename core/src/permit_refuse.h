@@ -14,10 +14,12 @@ bool iw_refuse_may_send(const iw_config_t *config);
 bool iw_refuse_not_followed(iw_cause_t cause);
 
 /// Returns true in the latched phases CUT and LATCHED.
-bool iw_refuse_latched(const iw_permit_t *self);
+static inline bool iw_refuse_latched(const iw_permit_t *self) {
+    return self->phase >= IW_PHASE_CUT;
+}
 
 /// Returns the reason why a client that is not the holder cannot be armed now.
-iw_refusal_t iw_refuse_arm(const iw_permit_t *self, iw_time_us_t now_us, bool takeover);
+iw_refusal_t iw_refuse_arm(const iw_permit_t *self, iw_time_us_t now_us, iw_client_t client, bool takeover);
 
 /// Returns the reason why a well-formed drive command is not accepted now.
 iw_refusal_t iw_refuse_drive(const iw_permit_t *self, iw_time_us_t sent_us, iw_client_t client);

@@ -151,7 +151,21 @@ TEST(test_one_person_reset_of_another_stop_does_not_clear_latch) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, daemon_rig_state());
 }
 
-/// The latch retains its first cause and number: an e-stop after it makes an older reset late.
+/// B's e-stop while already latched: C knows only the stop before it.
+TEST(test_one_person_reset_of_the_stop_before_another_estop_is_refused) {
+    const int other = daemon_rig_connect();
+    latch();
+    const unsigned first = stop_number();
+    daemon_rig_run(1200);
+    (void)daemon_rig_ask(other, "{\"cmd\":\"estop\",\"reason\":\"child on the ramp\"}");
+    daemon_rig_run(1200); // The cause is no longer present.
+    reset_of(first, "\"error\":\"stale_command\"");
+    assert_reply("{\"cmd\":\"why\"}", "(\\\"child on the ramp\\\") while latched by estop_software");
+    reset_of(first + 1U, "\"ok\":true");
+    (void)close(other);
+}
+
+/// Within the time of an event it is the same stop. An older reset is late by its time.
 TEST(test_one_person_reset_from_before_a_second_estop_is_late) {
     const int other = daemon_rig_connect();
     latch();

@@ -61,6 +61,33 @@ TEST(test_why_reports_for_each_stop_whether_it_ramped) {
     TEST_ASSERT_NOT_NULL(strstr(text, "; set to zero immediately at"));
 }
 
+TEST(test_why_of_an_estop_while_latched_names_the_first_cause) {
+    const iw_stop_t stop = {.number = 2,
+                            .cause = IW_CAUSE_ESTOP_LINE,
+                            .first = IW_CAUSE_OVERSPEED,
+                            .from = IW_STATE_LATCHED,
+                            .detail = 1,
+                            .at_us = 12345678,
+                            .latched = true,
+                            .at_once = true};
+    char text[IWN_SENTENCE_SIZE];
+    iwn_why_sentence(&stop, &context, text, sizeof text);
+    TEST_ASSERT_EQUAL_STRING("e-stop unix:/e pressed while latched by overspeed; still latched at 12.345 s; release "
+                             "the button, then: iwheelctl reset",
+                             text);
+}
+
+/// The same cause stops, or latches the third time.
+TEST(test_why_requires_a_reset_only_after_a_latch) {
+    iw_stop_t stop = {.number = 3, .cause = IW_CAUSE_PAIR_DIVERGES, .from = IW_STATE_ARMED};
+    char text[IWN_SENTENCE_SIZE];
+    iwn_why_sentence(&stop, &context, text, sizeof text);
+    TEST_ASSERT_NOT_NULL(strstr(text, "turns freely and drives, then arm again"));
+    stop.latched = true;
+    iwn_why_sentence(&stop, &context, text, sizeof text);
+    TEST_ASSERT_NOT_NULL(strstr(text, "turns freely and drives, then: iwheelctl reset"));
+}
+
 TEST(test_why_after_a_crash_has_no_unknown_values) {
     const iw_stop_t stop = {.number = 1, .cause = IW_CAUSE_RESTART, .at_once = true};
     char text[IWN_SENTENCE_SIZE];

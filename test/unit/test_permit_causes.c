@@ -32,9 +32,9 @@ typedef struct {
     }
 
 static const row_t rows[] = {
-    ALWAYS(IW_CAUSE_ESTOP_LINE),
+    {IW_CAUSE_ESTOP_LINE, {LATCH_SILENT, LATCH, LATCH, LATCH, LATCH, LATCH}},
+    {IW_CAUSE_ESTOP_SOFTWARE, {LATCH_SILENT, LATCH, LATCH, LATCH, LATCH, LATCH}},
     ALWAYS(IW_CAUSE_ESTOP_DISAGREES),
-    ALWAYS(IW_CAUSE_ESTOP_SOFTWARE),
     ALWAYS(IW_CAUSE_INTERNAL),
     MOVING(IW_CAUSE_WHEEL_LOST),
     MOVING(IW_CAUSE_WHEEL_REBOOTED),
@@ -125,8 +125,44 @@ TEST(test_permit_first_cause_of_a_latch_stays_the_cause) {
         permit_rig_raise(&rig, rows[i].cause);
         permit_rig_wait(&rig, MS(1));
         permit_rig_raise(&rig, rows[i].cause);
-        TEST_ASSERT_EQUAL_INT(IW_CAUSE_WHEEL_LOST, rig.permit.stop.cause);
+        const bool estop = rows[i].cause == IW_CAUSE_ESTOP_LINE || rows[i].cause == IW_CAUSE_ESTOP_SOFTWARE;
+        TEST_ASSERT_EQUAL_INT(estop ? rows[i].cause : IW_CAUSE_WHEEL_LOST, rig.permit.stop.cause);
+        TEST_ASSERT_EQUAL_INT(IW_CAUSE_WHEEL_LOST, rig.permit.stop.first);
+        TEST_ASSERT_EQUAL_UINT32(estop ? 2U : 1U, rig.permit.stop.number);
     }
+}
+
+/// A person who knows only the earlier stop must not reset the e-stop of another person.
+TEST(test_permit_estop_while_latched_is_a_new_stop_once_a_second) {
+    static const iw_cause_t estops[] = {IW_CAUSE_ESTOP_LINE, IW_CAUSE_ESTOP_SOFTWARE};
+    for (size_t i = 0; i < 2U; i++) {
+        setUp();
+        for (uint32_t number = 1; number <= 3U; number++) {
+            permit_rig_raise(&rig, estops[i]);
+            permit_rig_assert(&rig, IW_STATE_LATCHED, IW_DEMAND_SILENCE);
+            TEST_ASSERT_EQUAL_UINT32(number, rig.permit.stop.number);
+            TEST_ASSERT_TRUE(rig.permit.stop.at_us == rig.now_us);
+            TEST_ASSERT_TRUE(rig.permit.stop.latched);
+            TEST_ASSERT_EQUAL_INT((number == 1U) ? IW_STATE_LISTENING : IW_STATE_LATCHED, rig.permit.stop.from);
+            permit_rig_wait(&rig, IW_PERMIT_EVENT_US - 1U);
+            permit_rig_raise(&rig, estops[i]); // A bounce, or the same person again.
+            TEST_ASSERT_EQUAL_UINT32(number, rig.permit.stop.number);
+            permit_rig_wait(&rig, IW_PERMIT_EVENT_US);
+        }
+        permit_rig_raise(&rig, IW_CAUSE_INTERNAL);
+        TEST_ASSERT_EQUAL_UINT32(3, rig.permit.stop.number);
+    }
+}
+
+TEST(test_permit_reset_ends_the_memory_of_the_first_cause) {
+    permit_rig_raise(&rig, IW_CAUSE_INTERNAL);
+    permit_rig_wait(&rig, MS(1));
+    permit_rig_raise(&rig, IW_CAUSE_ESTOP_SOFTWARE);
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_INTERNAL, rig.permit.stop.first);
+    permit_rig_wait(&rig, IW_PERMIT_EVENT_US);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_reset(&rig));
+    permit_rig_raise(&rig, IW_CAUSE_ESTOP_LINE);
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_ESTOP_LINE, rig.permit.stop.first);
 }
 
 TEST(test_permit_latch_after_a_stop_is_a_new_stop) {

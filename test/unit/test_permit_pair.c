@@ -20,11 +20,12 @@ static iw_demand_t demand(void) {
     return iw_permit_demand(&rig.permit);
 }
 
-/// Arms again from STOPPING, with everything at standstill.
+/// Arms again from STOPPING, with everything at standstill and after the time of the zeros.
 static void arm_again(void) {
     rig.view.output_zero = true;
     rig.view.at_rest = true;
-    permit_rig_wait(&rig, MS(600));
+    permit_rig_step(&rig);
+    permit_rig_wait(&rig, MS(1500));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
     permit_rig_prove(&rig);
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_permit_state(&rig.permit));
@@ -112,6 +113,46 @@ TEST(test_permit_stops_of_other_causes_are_no_divergence) {
     }
 }
 
+/// The client whose wheels did not follow waits for the zeros of the stop. Another client may arm at standstill.
+TEST(test_permit_client_of_wheels_that_did_not_follow_waits) {
+    static const struct {
+        iw_cause_t cause;
+        iw_refusal_t refusal;
+    } rows[] = {{IW_CAUSE_WHEEL_BLOCKED, IW_REFUSE_WHEEL_BLOCKED}, {IW_CAUSE_PAIR_DIVERGES, IW_REFUSE_PAIR_DIVERGES}};
+    for (unsigned i = 0; i < 4U; i++) {
+        rig.config.hold = i >= 2U; // Time does not end the zeros, but the wait.
+        permit_rig_begin(&rig, PERMIT_ARMED);
+        raise(rows[i % 2U].cause, IW_SIDES_LEFT, IW_REACT_RAMP);
+        rig.view.output_zero = true;
+        rig.view.at_rest = true;
+        permit_rig_step(&rig);
+        rig.view.settled = true;
+        permit_rig_wait(&rig, MS(1500) - 1U);
+        TEST_ASSERT_EQUAL_INT(rows[i % 2U].refusal, permit_rig_arm(&rig, HOLDER));
+        const iw_permit_t before = rig.permit;
+        TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, OTHER));
+        rig.permit = before;
+        permit_rig_wait(&rig, 1);
+        TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
+    }
+}
+
+/// A reset is a decision of a person, so the wait ends with the latch.
+TEST(test_permit_reset_ends_the_wait_of_the_client) {
+    rig.config.hold = true;
+    permit_rig_begin(&rig, PERMIT_ARMED);
+    raise(IW_CAUSE_WHEEL_BLOCKED, IW_SIDES_LEFT, IW_REACT_RAMP);
+    raise(IW_CAUSE_ESTOP_LINE, IW_SIDES_NONE, IW_REACT_BY_CAUSE);
+    rig.view.output_zero = true;
+    rig.view.at_rest = true;
+    permit_rig_step(&rig);
+    permit_rig_wait(&rig, MS(600)); // The line is no longer raised, and the last command is old.
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_reset(&rig));
+    permit_rig_assert(&rig, IW_STATE_STOPPING, IW_DEMAND_ZERO);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_ARMED, permit_rig_drive(&rig, HOLDER, false));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
+}
+
 TEST(test_permit_one_wheel_offline_latches_with_the_ramp) {
     permit_rig_begin(&rig, PERMIT_ARMED);
     raise(IW_CAUSE_WHEEL_LOST, IW_SIDES_LEFT, IW_REACT_RAMP);
@@ -133,7 +174,7 @@ TEST(test_permit_ramp_of_one_wheel_offline_ends_by_other_causes) {
         raise(IW_CAUSE_WHEEL_LOST, IW_SIDES_RIGHT, IW_REACT_RAMP);
         permit_rig_raise(&rig, causes[i]);
         TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, demand());
-        TEST_ASSERT_EQUAL_INT(IW_CAUSE_WHEEL_LOST, rig.permit.stop.cause);
+        TEST_ASSERT_EQUAL_INT(IW_CAUSE_WHEEL_LOST, rig.permit.stop.first);
         raise(IW_CAUSE_WHEEL_LOST, IW_SIDES_RIGHT, IW_REACT_RAMP);
         TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, demand());
     }

@@ -26,8 +26,8 @@ static const fix_t fixes[] = {
     {"loop_hung", "the gateway did not get the processor; reduce the machine's load"},
     {"internal", "a fault of the gateway itself: save its log and report it"},
     {"loop_late", "the gateway got the processor late; reduce the machine's load"},
-    {"wheel_blocked", "free the wheel, then arm again"},
-    {"pair_diverges", "check that the wheel turns freely and drives, then arm again"},
+    {"wheel_blocked", "free the wheel"},
+    {"pair_diverges", "check that the wheel turns freely and drives"},
     {"lease_lost", "the client must send drive commands more often, or raise lease_ms"},
 };
 
@@ -158,7 +158,7 @@ void advice_collect(const json_t *status, advice_t *out_advice) {
         add(out_advice,
             "zeros hold the wheels; to end that: iwheelctl release, and the machine may roll; or arm again");
     } else if (strcmp(state, "stopping") == 0) {
-        add(out_advice, "%s", known ? fix : "wait until both wheels are at standstill, then arm again");
+        add(out_advice, "%.290s, then arm again", known ? fix : "wait until both wheels are at standstill");
     } else if (strcmp(state, "latched") == 0) {
         add(out_advice, "%.290s, then: iwheelctl reset", known ? fix : "remove the cause");
         add_present(status, out_advice);

@@ -186,7 +186,8 @@ typedef struct {
     uint32_t detail;    ///< See iw_cause_t.
     iw_client_t client; ///< Client that held the lease, or that requested the stop.
     iw_pair_t applied;  ///< Last pair before the stop, in the machine's frame.
-    iw_cause_t cause;   ///< The first cause.
+    iw_cause_t cause;   ///< The first cause, or the cause of an e-stop that began while latched.
+    iw_cause_t first;   ///< The first cause of the latch, if `latched`. It differs from `cause` after such an e-stop.
     iw_state_t from;    ///< State before the stop.
     uint8_t sides;      ///< Wheels that the cause refers to: IW_SIDES_...
     bool latched;       ///< The stop needs a reset.

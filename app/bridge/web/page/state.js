@@ -23,7 +23,7 @@ function adviseIn(state) {
   const next = STRINGS.next, fix = state.cause ? fixOf(state, state.cause) : null;
   if (state.state === "armed") return [next.armed];
   if (state.state === "stopping" && state.holding) return [next.holding];
-  if (state.state === "stopping") return [fix ?? next.stopping];
+  if (state.state === "stopping") return [fill(next.stopping, { fix: fix ?? next.standstill })];
   if (state.state === "latched") return [fill(next.latched, { fix: fix ?? next.remove }), ...presentAdvice(state)];
   if (state.state !== "listening") return [next.newer];
   const lines = presentAdvice(state);

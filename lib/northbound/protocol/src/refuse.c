@@ -67,7 +67,7 @@ static void explain_estop(wording_t *self) {
     WRITE(self, "the e-stop ", self->context->estop,
           (self->context->estop_answer < 0) ? " cannot be read, which counts as pressed; check its wire"
                                             : " is pressed; release the button",
-          iwn_why_then(IW_CAUSE_ESTOP_LINE));
+          iwn_why_then(IW_CAUSE_ESTOP_LINE, true));
 }
 
 static void explain_lost(wording_t *self) {
@@ -166,7 +166,8 @@ static void explain_present(wording_t *self) {
         }
         iwn_text_add(&self->text, iwn_cause_name((iw_cause_t)cause));
         since(self, " was seen ", self->seen->seen_us[cause], " ms ago; ");
-        WRITE(self, iwn_why_fix((iw_cause_t)cause), iwn_why_then((iw_cause_t)cause), ", and wait a second");
+        WRITE(self, iwn_why_fix((iw_cause_t)cause),
+              iwn_why_then((iw_cause_t)cause, self->seen->state == IW_STATE_LATCHED), ", and wait a second");
         return;
     }
     number(self, "zeros are still sent after a crash or a delay of the gateway; wait ",

@@ -44,16 +44,14 @@ static const row_t rows[IW_CAUSES] = {
     [IW_CAUSE_ESTOP_DISAGREES] = {"the two contacts of e-stop $e disagree",
                                   "fix contact or wire, press and release the button"},
     [IW_CAUSE_LOOP_HUNG] = {"the gateway itself was held up for $n ms", "see what else runs on this machine"},
-    [IW_CAUSE_LOOP_LATE] = {"the gateway itself was held up for $n ms",
-                            "see what else runs on this machine, then arm again"},
+    [IW_CAUSE_LOOP_LATE] = {"the gateway itself was held up for $n ms", "see what else runs on this machine"},
     [IW_CAUSE_INTERNAL] = {"an internal check failed ($n)", "report this with the log"},
     [IW_CAUSE_SHUTDOWN] = {"the gateway was shut down", "start it again to go on"},
     [IW_CAUSE_RESTART] = {"the gateway before this one died while the wheels were armed",
                           "find the crash in the log, then arm again"},
     // Causes by a person or a client.
-    [IW_CAUSE_ESTOP_SOFTWARE] = {"software e-stop by $c$r", "when it is safe: iwheelctl reset"},
-    [IW_CAUSE_LEASE_LOST] = {"$c sent no drive command for $n ms",
-                             "send drive commands more often or raise lease_ms, then arm again"},
+    [IW_CAUSE_ESTOP_SOFTWARE] = {"software e-stop by $c$r", "make sure that it is safe"},
+    [IW_CAUSE_LEASE_LOST] = {"$c sent no drive command for $n ms", "send drive commands more often or raise lease_ms"},
     [IW_CAUSE_CLIENT_GONE] = {"$c disconnected", "arm again to go on"},
     [IW_CAUSE_CLIENT_STOP] = {"$c requested a stop", "arm again to go on"},
     // Causes in the machine: bus and wheels.
@@ -65,10 +63,10 @@ static const row_t rows[IW_CAUSES] = {
     [IW_CAUSE_SECOND_MASTER] = {"another device sent a setpoint, id $n (0x$x)", "switch the other sender off"},
     [IW_CAUSE_FEEDBACK_SIGN] = {"$w turns against its command at $n mm/s", "check invert in the configuration"},
     [IW_CAUSE_OVERSPEED] = {"$w turns faster than commanded, at $n mm/s", "check radius, gear ratio and slope"},
-    [IW_CAUSE_WHEEL_BLOCKED] = {"$w blocked: only $n mm/s", "remove what blocks the wheel, then arm again"},
+    [IW_CAUSE_WHEEL_BLOCKED] = {"$w blocked: only $n mm/s", "remove what blocks the wheel"},
     [IW_CAUSE_PAIR_DIVERGES] =
         {"$w does not follow its command: the machine left its path by $n mm, right against left",
-         "check that the wheel turns freely and drives, then arm again"},
+         "check that the wheel turns freely and drives"},
 };
 
 static const char *detail_words(const iw_stop_t *stop) {
@@ -125,6 +123,9 @@ static void add_clause(const iw_stop_t *stop, const iwn_why_context_t *context, 
 }
 
 static const char *manner(const iw_stop_t *stop) {
+    if (stop->from == IW_STATE_LATCHED) {
+        return "still latched";
+    }
     if (stop->from == IW_STATE_LISTENING && stop->cause != IW_CAUSE_RESTART) {
         return "nothing was being sent; latched";
     }
@@ -142,6 +143,9 @@ static void add_doing(const iw_stop_t *stop, iwn_text_t *text) {
         add_number(text, stop->applied.wheel[IW_RIGHT].speed_mm_s, " mm/s");
     } else if (stop->cause != IW_CAUSE_RESTART) { // Otherwise the gateway does not know it.
         IWN_TEXT_JOIN(text, " while ", iwn_state_name(stop->from));
+    }
+    if (stop->from == IW_STATE_LATCHED) {
+        IWN_TEXT_JOIN(text, " by ", iwn_cause_name(stop->first));
     }
 }
 
@@ -163,16 +167,16 @@ void iwn_why_sentence(const iw_stop_t *stop, const iwn_why_context_t *context, c
     add_doing(stop, &text);
     IWN_TEXT_JOIN(&text, "; ", manner(stop), " at ");
     add_time(stop->at_us, &text);
-    IWN_TEXT_JOIN(&text, "; ", iwn_why_fix(stop->cause), iwn_why_then(stop->cause));
+    IWN_TEXT_JOIN(&text, "; ", iwn_why_fix(stop->cause), iwn_why_then(stop->cause, stop->latched));
 }
 
 const char *iwn_why_fix(iw_cause_t cause) {
     return rows[((unsigned)cause < IW_CAUSES) ? cause : IW_CAUSE_INTERNAL].fix;
 }
 
-const char *iwn_why_then(iw_cause_t cause) {
-    const bool by_itself = cause == IW_CAUSE_NONE || cause == IW_CAUSE_ESTOP_SOFTWARE;
-    return (by_itself || ((unsigned)cause > IW_CAUSE_INTERNAL && (unsigned)cause < IW_CAUSES))
-               ? ""
-               : ", then: iwheelctl reset";
+const char *iwn_why_then(iw_cause_t cause, bool latched) {
+    if (latched) {
+        return ", then: iwheelctl reset";
+    }
+    return (cause <= IW_CAUSE_LEASE_LOST) ? ", then arm again" : "";
 }

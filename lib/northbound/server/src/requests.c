@@ -105,16 +105,18 @@ static void do_stop(iwn_server_t *self, iwn_client_t *client) {
 static void do_estop(iwn_server_t *self, iwn_client_t *client) {
     const iw_snapshot_t *const seen = iwn_server_snapshot(self);
     const bool latched = seen->state == IW_STATE_LATCHED;
+    const uint32_t number = seen->stop->number;
     iwn_target_asked_to_stop(self, client);
     self->estopped_us = self->now_us;
     self->estopped_by = client->id;
-    if (!latched) {
-        memcpy(self->estop_reason, self->request.reason, sizeof self->estop_reason);
-    }
     // Already in effect: repeated requests cost neither a step nor space in the recorder.
     if (!latched || self->now_us - seen->seen_us[IW_CAUSE_ESTOP_SOFTWARE] >= IWN_ESTOP_AGAIN_US) {
         iw_gateway_estop(self->core, self->now_us, client->id);
         iwn_target_judged(self, client, IW_REFUSE_NONE);
+    }
+    // The reason belongs to the stop. A repeated request makes none.
+    if (seen->stop->number != number) {
+        memcpy(self->estop_reason, self->request.reason, sizeof self->estop_reason);
     }
     reply_state(self, client);
 }

@@ -35,8 +35,8 @@ void iwn_why_sentence(const iw_stop_t *stop, const iwn_why_context_t *context, c
 /// Returns the fix for a cause, also for refusals.
 const char *iwn_why_fix(iw_cause_t cause);
 
-/// Returns the next step after the fix: the reset if the cause latches. Separate, because most causes have it.
-const char *iwn_why_then(iw_cause_t cause);
+/// Returns the next step after the fix: the reset if `latched`, otherwise arm. Separate, because most causes have it.
+const char *iwn_why_then(iw_cause_t cause, bool latched);
 
 #ifdef __cplusplus
 }
