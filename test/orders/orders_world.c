@@ -94,7 +94,7 @@ static int world_estop(void *context) {
     world_t *const self = context;
     const int result = (self->pressed || self->edge) ? 1 : 0;
     self->edge = false;
-    oracle_estop(&self->oracle, result);
+    oracle_estop(&self->oracle, self->now_us, result);
     return result;
 }
 

@@ -55,7 +55,8 @@ void oracle_start(oracle_t *self, const iw_gateway_t *gateway, iw_time_us_t now_
     self->late_us = now_us;
     self->ramp_us = self->foreign_us = self->nonzero_drive_us = self->refused_us = self->silent_us = IW_NEVER;
     self->turning_us = self->turned_us = self->setpoint_us = IW_NEVER;
-    self->stops = gateway->permit.stop.number;
+    self->stops = self->latch_stop = gateway->permit.stop.number;
+    self->estop_us[0] = self->estop_us[1] = IW_NEVER;
     self->bus_bad_us = now_us;
     for (size_t side = 0; side < IW_SIDES; side++) {
         oracle_wheel_t *const wheel = &self->wheel[side];
@@ -127,10 +128,19 @@ void oracle_step_begin(oracle_t *self, iw_time_us_t now_us, iw_time_us_t promise
     }
 }
 
-void oracle_estop(oracle_t *self, int result) {
+void oracle_note_estop(oracle_t *self, iw_time_us_t now_us, unsigned which) {
+    const iw_time_us_t last_us = self->estop_us[which];
+    self->estop_new = self->estop_new || last_us == IW_NEVER || oracle_elapsed(now_us, last_us, EVENT_US);
+    self->estop_us[which] = now_us;
+}
+
+void oracle_estop(oracle_t *self, iw_time_us_t now_us, int result) {
     self->estop = result;
     if (result != 0) {
         oracle_hard_stop(self);
+    }
+    if (result != 0 && result != IW_ESTOP_DISAGREES) {
+        oracle_note_estop(self, now_us, 0);
     }
 }
 
@@ -346,7 +356,8 @@ static void judge_state(oracle_t *self, iw_time_us_t now_us, bool zero, int32_t 
         oracle_break(self, now_us, 502, "sent on latching from LISTENING");
     }
     if (state == IW_STATE_LATCHED && self->state == IW_STATE_LATCHED &&
-        (self->latched_silent || (!self->hold_active && zeros_are_over(self, now_us, self->held_us, oracle_us(100))))) {
+        (self->latched_silent ||
+         (!self->hold_active && !self->estop_new && zeros_are_over(self, now_us, self->held_us, oracle_us(100))))) {
         oracle_break(self, now_us, 503, "sent while LATCHED, after the last zero");
     }
     if (self->hard && zero && limit && current != self->config->max_current_mA) {
@@ -507,9 +518,33 @@ static bool latches_with_a_ramp(const oracle_t *self) {
     return one && (stop->cause == IW_CAUSE_WHEEL_LOST || stop->cause == IW_CAUSE_PAIR_DIVERGES);
 }
 
+/// Only an e-stop that begins makes a new stop of a latch. It begins the zeros again, unless they are over.
+static void judge_latched_again(oracle_t *self, iw_time_us_t now_us, bool silent) {
+    const bool numbered = self->gateway->permit.stop.number == self->latch_stop + 1U;
+    if (numbered != self->estop_new || self->gateway->permit.stop.number - self->latch_stop > 1U) {
+        oracle_break(self, now_us, 208, "%u stops in one latch for %u new e-stops",
+                     (unsigned)(self->gateway->permit.stop.number - self->latch_stop), self->estop_new ? 1U : 0U);
+    }
+    const bool held = oracle_elapsed(now_us, self->latched_us, oracle_us(self->config->zero_hold_ms));
+    if (self->estop_new && !self->latched_silent && silent && !held) {
+        oracle_break(self, now_us, 209, "silent too early after an e-stop in a latch");
+    }
+    if (self->estop_new && self->latched_silent && !silent) {
+        oracle_break(self, now_us, 502, "zeros begin by an e-stop although nothing was being sent");
+    }
+}
+
 static void begin_latch(oracle_t *self, iw_time_us_t now_us) {
+    const bool silent = iw_permit_demand(&self->gateway->permit) == IW_DEMAND_SILENCE;
+    const bool again = self->state == IW_STATE_LATCHED;
+    if (again) {
+        judge_latched_again(self, now_us, silent);
+        if (!self->estop_new) {
+            return;
+        }
+    }
     self->latched_us = self->held_us = now_us;
-    self->latched_silent = self->state == IW_STATE_LISTENING && !self->was_arming;
+    self->latched_silent = again ? silent : self->state == IW_STATE_LISTENING && !self->was_arming;
     oracle_hold_latched(self, now_us);
     if (latches_with_a_ramp(self)) {
         oracle_soft_stop(self, now_us);
@@ -526,9 +561,11 @@ void oracle_observe(oracle_t *self, iw_time_us_t now_us) {
     } else if (self->armed) {
         oracle_soft_stop(self, now_us);
     }
-    if (state == IW_STATE_LATCHED && self->state != IW_STATE_LATCHED) {
+    if (state == IW_STATE_LATCHED) {
         begin_latch(self, now_us);
     }
+    self->estop_new = false;
+    self->latch_stop = self->gateway->permit.stop.number;
     oracle_judge_hold_state(self, now_us, state);
     if (state == IW_STATE_STOPPING && self->state != IW_STATE_STOPPING) {
         // A reset that does not end the hold does not change its time.

@@ -88,7 +88,10 @@ typedef struct {
     iw_time_us_t setpoint_us; ///< Last time when setpoints were due; IW_NEVER: never.
 
     int estop;
-    iw_time_us_t apart_us; ///< Begin of the difference of its contacts, if `apart`.
+    iw_time_us_t estop_us[2]; ///< Last time of an e-stop by the line and by a client; IW_NEVER: never.
+    bool estop_new;           ///< It began since the last observation.
+    uint32_t latch_stop;      ///< Number of the last stop at the last observation.
+    iw_time_us_t apart_us;    ///< Begin of the difference of its contacts, if `apart`.
     bool apart;
     bool quarrel;      ///< They differed for too long ...
     bool both_pressed; ///< ... and have both been pressed since.
@@ -124,7 +127,7 @@ void oracle_step_begin(oracle_t *self, iw_time_us_t now_us, iw_time_us_t promise
 void oracle_step_end(oracle_t *self, iw_time_us_t now_us);
 
 /// Input and output of the gateway through the port.
-void oracle_estop(oracle_t *self, int result);
+void oracle_estop(oracle_t *self, iw_time_us_t now_us, int result);
 /// The readings of both contacts, where there are two, and the result of the port.
 void oracle_contacts(oracle_t *self, iw_time_us_t now_us, const int reading[2], int result);
 void oracle_bus(oracle_t *self, iw_time_us_t now_us, iw_bus_state_t state);

@@ -38,6 +38,9 @@ iw_time_us_t oracle_us(uint32_t ms);
 void oracle_hard_stop(oracle_t *self);
 void oracle_soft_stop(oracle_t *self, iw_time_us_t at_us);
 
+/// An e-stop by the line (0) or by a client (1). One within EVENT_US of the last is the same.
+void oracle_note_estop(oracle_t *self, iw_time_us_t now_us, unsigned which);
+
 /// Returns the longest duration of zeros that began at that time.
 iw_time_us_t oracle_hold_max_us(const oracle_t *self, iw_time_us_t from_us);
 iw_time_us_t oracle_zeros_from(const oracle_t *self, iw_time_us_t from_us);

@@ -148,6 +148,7 @@ void oracle_shutdown(oracle_t *self, iw_time_us_t now_us) {
 
 void oracle_soft_estop(oracle_t *self, iw_time_us_t now_us) {
     oracle_hard_stop(self);
+    oracle_note_estop(self, now_us, 1);
     if (iw_gateway_state(self->gateway) != IW_STATE_LATCHED) {
         oracle_break(self, now_us, 207, "not LATCHED after a software e-stop");
     }

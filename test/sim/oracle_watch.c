@@ -6,8 +6,8 @@
 
 /// An echo that takes longer than this shows that the bus does not accept frames in time.
 #define SLOW_ECHO_US (20U * MS)
-/// Additional time for a condition that must last: the time between steps.
-#define MARGIN_US (70U * MS)
+/// Additional time for a condition that must last: the core compares a step later, and a loop that is 100 ms late stops.
+#define MARGIN_US (100U * MS)
 /// A step this long after the last one was late: the wheels have not been compared meanwhile.
 #define LATE_STEP_US (60U * MS)
 

@@ -167,7 +167,7 @@ static int port_estop(void *context) {
     const int first = rig_active(rig, EV_ESTOP_GONE) ? -1 : (pressed ? 1 : 0);
     const int result = rig->scenario->two_contacts ? see_both(rig, first) : first;
     rig->edge = false;
-    oracle_estop(&rig->oracle, result);
+    oracle_estop(&rig->oracle, rig->now_us, result);
     return result;
 }
 
