@@ -53,6 +53,11 @@ static iw_refusal_t refuse_sending(const iw_permit_t *self, iw_time_us_t now_us)
     return (self->phase == IW_PHASE_RESTARTING) ? IW_REFUSE_CAUSE_PRESENT : IW_REFUSE_NONE;
 }
 
+/// Returns the refusal of the client whose wheels did not follow.
+static iw_refusal_t refuse_blocked(const iw_permit_t *self) {
+    return (self->stop.cause == IW_CAUSE_PAIR_DIVERGES) ? IW_REFUSE_PAIR_DIVERGES : IW_REFUSE_WHEEL_BLOCKED;
+}
+
 /// Returns true until the zeros after a stop have had their time. Until BRAKING becomes HOLDING the output is not zero,
 /// which refuses arm.
 static bool is_hold_due(const iw_permit_t *self, iw_time_us_t now_us) {
@@ -65,7 +70,7 @@ static iw_refusal_t refuse_lease(const iw_permit_t *self, iw_time_us_t now_us, i
         return IW_REFUSE_BUSY;
     }
     if (self->blocked == client && is_hold_due(self, now_us)) {
-        return (iw_refusal_t)iw_cause_rows[self->stop.cause].refusal;
+        return refuse_blocked(self);
     }
     if (stale_command(self, now_us)) {
         return IW_REFUSE_STALE_COMMAND;
@@ -102,7 +107,7 @@ iw_refusal_t iw_refuse_drive(const iw_permit_t *self, iw_time_us_t sent_us, iw_c
     case IW_STATE_LATCHED:
         return refuse_latched(refuse_present(self, sent_us));
     case IW_STATE_STOPPING:
-        return (self->blocked == client) ? (iw_refusal_t)iw_cause_rows[self->stop.cause].refusal : IW_REFUSE_NOT_ARMED;
+        return (self->blocked == client) ? refuse_blocked(self) : IW_REFUSE_NOT_ARMED;
     case IW_STATE_ARMED:
         return refuse_holder(self, sent_us, client);
     case IW_STATE_LISTENING:
