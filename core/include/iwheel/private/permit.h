@@ -30,8 +30,8 @@
 ///
 /// With `iw_config_t::hold` (R19) time ends neither HOLDING nor CUT, RESTARTING becomes HOLDING, and `reset` leads from
 /// CUT to HOLDING. The hold ends by a setpoint of another sender, by `iw_permit_release`, and by the end of the
-/// gateway. Then time ends the zeros, as without the option. A latch after a release, while zeros are still sent, holds
-/// again.
+/// gateway. Then time ends the zeros, as without the option. A latch after a release, or an e-stop in that latch, while
+/// zeros are still sent, holds again.
 ///
 /// Only an accepted drive command extends the lease.
 #ifndef IW_PERMIT_H
@@ -95,7 +95,7 @@ typedef struct {
     iw_permit_view_t view;       ///< Facts of the last step, written by the owner. Requests are judged by them.
     iw_client_t stale_client;    ///< Client of the last nonzero drive command.
     iw_client_t holder;          ///< Lease holder; IW_CLIENT_NONE if there is none.
-    iw_client_t blocked;         ///< Client whose wheels did not follow at the last stop: refused until the hold ends.
+    iw_client_t blocked;         ///< Client whose wheels did not follow at the last stop: see iw_permit_arm.
     uint32_t raised;             ///< Bit mask of causes that were raised since the last step.
     uint32_t present;            ///< Bit mask of causes that were raised in the step before.
     uint32_t still_moving;       ///< Number of holds that ended after `hold_max_s` while a wheel still turned.
@@ -131,7 +131,7 @@ typedef struct {
 void iw_permit_init(iw_permit_t *self, const iw_config_t *config, iw_time_us_t now_us, bool restarted);
 
 /// Reports that a cause is present or has just occurred. It takes effect immediately. The first cause of a latch
-/// remains its cause.
+/// remains its cause, except that an e-stop that begins is a new stop. Repeated within IW_PERMIT_EVENT_US it is the same.
 void iw_permit_raise(iw_permit_t *self, const iw_event_t *event, iw_time_us_t now_us);
 
 /// Reports that this step cannot judge ages: SEND_STALLED and WHEEL_LOST remain present if they were present.
@@ -156,8 +156,9 @@ bool iw_cause_latches(iw_cause_t cause);
 iw_demand_t iw_permit_demand(const iw_permit_t *self);
 
 /// Requests ARMED for `client`. Returns IW_REFUSE_NONE if arming has begun, or if the client already holds the lease,
-/// which does not extend it. With `takeover` the lease of another client moves to `client` if the output is zero and
-/// both wheels are at standstill.
+/// which does not extend it. The client whose wheels did not follow waits until the zeros of that stop have lasted
+/// `zero_hold_ms`. With `takeover` the lease of another client moves to `client` if the output is zero and both wheels
+/// are at standstill.
 iw_refusal_t iw_permit_arm(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client, bool takeover);
 
 /// Judges a well-formed drive command. Returns IW_REFUSE_NONE if it is accepted, and extends the lease. Stores the time
