@@ -56,7 +56,7 @@ static const row_t rows[IW_CAUSES] = {
     [IW_CAUSE_CLIENT_STOP] = {"$c requested a stop", "arm again to go on"},
     // Causes in the machine: bus and wheels.
     [IW_CAUSE_WHEEL_LOST] = {"$w sent no telemetry for $n ms", "check the wheel's power and cable"},
-    [IW_CAUSE_WHEEL_REBOOTED] = {"$w rebooted ($d)", "check the wheel's power"},
+    [IW_CAUSE_WHEEL_REBOOTED] = {"$w rebooted ($d)", "check the wheel's power and cable"},
     [IW_CAUSE_SEND_STALLED] = {"setpoint not acknowledged on the bus for $n ms",
                                "check that the wheels have power and the bus is terminated"},
     [IW_CAUSE_BUS_DOWN] = {"bus $b is $d", "bring the bus up"},
@@ -142,10 +142,9 @@ static void add_doing(const iw_stop_t *stop, iwn_text_t *text) {
         add_number(text, stop->applied.wheel[IW_LEFT].speed_mm_s, "/");
         add_number(text, stop->applied.wheel[IW_RIGHT].speed_mm_s, " mm/s");
     } else if (stop->cause != IW_CAUSE_RESTART) { // Otherwise the gateway does not know it.
-        IWN_TEXT_JOIN(text, " while ", iwn_state_name(stop->from));
-    }
-    if (stop->from == IW_STATE_LATCHED) {
-        IWN_TEXT_JOIN(text, " by ", iwn_cause_name(stop->first));
+        const bool latched = stop->from == IW_STATE_LATCHED;
+        IWN_TEXT_JOIN(text, " while ", iwn_state_name(stop->from), latched ? " by " : "",
+                      latched ? iwn_cause_name(stop->first) : "");
     }
 }
 
