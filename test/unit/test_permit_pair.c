@@ -149,6 +149,7 @@ TEST(test_permit_reset_ends_the_wait_of_the_client) {
     permit_rig_wait(&rig, MS(600)); // The line is no longer raised, and the last command is old.
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_reset(&rig));
     permit_rig_assert(&rig, IW_STATE_STOPPING, IW_DEMAND_ZERO);
+    TEST_ASSERT_EQUAL_UINT32(IW_CLIENT_NONE, rig.permit.blocked);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_ARMED, permit_rig_drive(&rig, HOLDER, false));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
 }
