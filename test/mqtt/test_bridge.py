@@ -35,6 +35,41 @@ int clock_gettime(clockid_t clock, struct timespec *now) {
 }
 """
 
+# A disk of the spool that answers nothing for 3 s and then fails. What is written is counted by thread: the first word is that of the main thread.
+SLOW_DISK = r"""
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+#include <sys/syscall.h>
+static int is_spool(int fd) {
+    char link[64], path[256];
+    snprintf(link, sizeof link, "/proc/self/fd/%d", fd);
+    ssize_t length = readlink(link, path, sizeof path - 1);
+    path[length > 0 ? length : 0] = 0;
+    return strstr(path, "/spool") != NULL;
+}
+static void note(const char *call) {
+    if (getpid() == (pid_t)syscall(SYS_gettid)) { fprintf(stderr, "the main thread waits for the disk: %s\n", call); }
+}
+int fdatasync(int fd) {
+    (void)fd;
+    note("fdatasync");
+    sleep(3);
+    errno = EIO;
+    return -1;
+}
+int fsync(int fd) { note("fsync"); return fdatasync(fd); }
+ssize_t write(int fd, const void *bytes, size_t size) {
+    static ssize_t (*real)(int, const void *, size_t);
+    if (!real) { real = (ssize_t (*)(int, const void *, size_t))dlsym(RTLD_NEXT, "write"); }
+    if (is_spool(fd)) { note("write"); }
+    return real(fd, bytes, size);
+}
+"""
+
 
 def counts(far):
     return far.messages("info")[-1]["commands"]
@@ -510,16 +545,41 @@ def test_disk_full_events_wait_in_memory_and_are_reported(rig):
     far.print_figures("disk full at 2 kB: events stored in memory, `on_disk` and the log report it")
 
 
-def test_clock_that_steps_changes_neither_ages_nor_order(rig):
-    source, library = rig.path("stepped.c"), rig.path("stepped.so")
-    Path(source).write_text(STEPPED, encoding="ascii")
+def preloaded(rig, text):
+    """The environment in which the bridge uses these functions."""
+    source, library = rig.path("preload.c"), rig.path("preload.so")
+    Path(source).write_text(text, encoding="ascii")
     subprocess.run(["cc", "-shared", "-fPIC", "-o", library, source, "-ldl"], check=True)
-    preload = library
     if "asan" in subprocess.run(["ldd", rig.program("iwheel-mqtt")], capture_output=True, text=True, check=True).stdout:
         raise Skip("the sanitizer must be loaded first")
+    return {**os.environ, "LD_PRELOAD": library}
+
+
+def test_disk_that_hangs_and_fails_delays_no_stop(rig):
     rig.start_gateway()
     rig.start_broker()
-    rig.start_bridge(env={**os.environ, "LD_PRELOAD": preload})
+    rig.start_bridge(env=preloaded(rig, SLOW_DISK))
+    far = rig.online()
+    make_stops(rig, 2)
+    end, longest = time.monotonic() + 10, 0.0
+    while time.monotonic() < end:
+        begun = time.monotonic()
+        answer = far.ask("stop", quote=far.quote(10))
+        longest = max(longest, time.monotonic() - begun)
+        assert answer["ok"], (answer, longest)
+        time.sleep(0.1)
+    all_arrive(far, 2, 10)
+    assert "accepts no data" in rig.bridge.text() and not far.messages("info")[-1]["events"]["on_disk"]
+    assert "the main thread waits" not in rig.bridge.text(), rig.bridge.text()
+    assert longest < 0.8, f"a stop and its question took {longest:.2f} s"
+    rig.bridge.signal(signal.SIGTERM)
+    assert rig.bridge.wait(4) == 0, "the end waits for the disk for a second at most"
+
+
+def test_clock_that_steps_changes_neither_ages_nor_order(rig):
+    rig.start_gateway()
+    rig.start_broker()
+    rig.start_bridge(env=preloaded(rig, STEPPED))
     far = rig.online()
     assert far.ask("stop")["ok"] and far.ask("why")["ok"]
     make_stops(rig, 2)
@@ -582,6 +642,17 @@ def test_tls_needs_signer_name_and_certificate_of_machine(rig):
     until(lambda: "connected to the broker" in rig.bridge.text(), 5, rig.bridge.text())
     far = rig.far(setup=lambda client: client.tls_set(rig.path("ca.pem"), rig.path("machine.pem"), rig.path("machine.key")) or client.tls_insecure_set(True))
     rig.online(far)
+
+
+def test_tls_file_that_cannot_be_read_delays_no_stop(rig):
+    """A pipe without a writer: a read of the file does not return, as on a disk that hangs."""
+    os.mkfifo(rig.path("ca.pem"))
+    rig.mqtt_settings["broker"].update({"host": "localhost", "ca": rig.path("ca.pem")})
+    rig.start_gateway()
+    rig.start_bridge()
+    until(lambda: "connected to the gateway" in rig.bridge.text(), what="the bridge does its other work")
+    rig.bridge.signal(signal.SIGTERM)
+    assert rig.bridge.wait(4) == 0
 
 
 def test_credentials_wrong_or_readable_by_others_are_refused(rig):

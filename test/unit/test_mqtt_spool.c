@@ -5,7 +5,9 @@
 #include "unit.h"
 
 #include <errno.h>
+#include <pthread.h>
 #include <signal.h>
+#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -14,12 +16,73 @@
 #include <unistd.h>
 
 #define SMALL (2U * MQTT_SPOOL_EVENT_MAX)
+#define COUNT 5000U
+
+ssize_t __real_write(int file, const void *bytes, size_t length);
+ssize_t __wrap_write(int file, const void *bytes, size_t length);
+int __real_fdatasync(int file);
+int __wrap_fdatasync(int file);
+int __real_fsync(int file);
+int __wrap_fsync(int file);
+int __real_renameat(int from, const char *name, int to, const char *fresh);
+int __wrap_renameat(int from, const char *name, int to, const char *fresh);
+
+/// What the disk does.
+static struct {
+    pthread_t caller;      ///< Thread of the test.
+    atomic_uint by_caller; ///< Calls that wait for the disk, by the thread of the test.
+    atomic_bool hangs;     ///< No sync ends.
+    atomic_bool breaks;    ///< Each sync fails.
+    atomic_uint syncs;     ///< Syncs that began.
+} disk;
 
 static char folder[64];
 static char path[80];
 static mqtt_spool_t spool;
 
+static void note_caller(void) {
+    if (pthread_equal(pthread_self(), disk.caller) != 0) {
+        atomic_fetch_add(&disk.by_caller, 1U);
+    }
+}
+
+ssize_t __wrap_write(int file, const void *bytes, size_t length) {
+    note_caller();
+    return __real_write(file, bytes, length);
+}
+
+int __wrap_fdatasync(int file) {
+    note_caller();
+    atomic_fetch_add(&disk.syncs, 1U);
+    while (atomic_load(&disk.hangs)) {
+        (void)usleep(1000);
+    }
+    if (atomic_load(&disk.breaks)) {
+        errno = EIO;
+        return -1;
+    }
+    return __real_fdatasync(file);
+}
+
+int __wrap_fsync(int file) {
+    note_caller();
+    return __real_fsync(file);
+}
+
+int __wrap_renameat(int from, const char *name, int to, const char *fresh) {
+    note_caller();
+    return __real_renameat(from, name, to, fresh);
+}
+
+static void settle(void) {
+    TEST_ASSERT_TRUE(mqtt_spool_flush(&spool));
+}
+
 void setUp(void) {
+    disk.caller = pthread_self();
+    atomic_store(&disk.by_caller, 0U);
+    atomic_store(&disk.hangs, false);
+    atomic_store(&disk.breaks, false);
     // In memory, where there is such a folder: each new file waits for the disk.
     (void)snprintf(folder, sizeof folder, "%s/iwheel-spool-XXXXXX",
                    (access("/dev/shm", W_OK) == 0) ? "/dev/shm" : "/tmp");
@@ -29,6 +92,8 @@ void setUp(void) {
 }
 
 void tearDown(void) {
+    atomic_store(&disk.hangs, false);
+    atomic_store(&disk.breaks, false);
     (void)mqtt_spool_close(&spool);
     (void)unlink(path);
     (void)rmdir(folder);
@@ -64,6 +129,7 @@ static void expect(unsigned first, unsigned last) {
 }
 
 static size_t read_all(char *out, size_t size) {
+    settle();
     FILE *file = fopen(path, "rb");
     TEST_ASSERT_NOT_NULL(file);
     const size_t length = fread(out, 1, size, file);
@@ -233,6 +299,7 @@ TEST(test_spool_half_written_new_file_is_ignored) {
     (void)fclose(file);
     TEST_ASSERT_TRUE(mqtt_spool_open(&spool, folder, SMALL));
     expect(1, 1);
+    settle();
     TEST_ASSERT_NOT_EQUAL_INT(0, access(fresh, F_OK));
 }
 
@@ -260,15 +327,16 @@ TEST(test_spool_full_drops_the_oldest_and_counts) {
 
 TEST(test_spool_file_stays_bounded_over_5000_events) {
     char bytes[4U * SMALL];
-    for (unsigned i = 1; i <= 5000; i++) {
+    for (unsigned i = 1; i <= COUNT; i++) {
         add(i);
         mqtt_spool_confirm(&spool, i);
+        mqtt_spool_sync(&spool);
         TEST_ASSERT_TRUE(spool.file_bytes <= 2U * SMALL + MQTT_SPOOL_EVENT_MAX);
     }
     TEST_ASSERT_TRUE(read_all(bytes, sizeof bytes) <= 2U * SMALL + MQTT_SPOOL_EVENT_MAX);
     reopen();
     expect(1, 0);
-    TEST_ASSERT_EQUAL_UINT64(5000, spool.last);
+    TEST_ASSERT_EQUAL_UINT64(COUNT, spool.last);
 }
 
 TEST(test_spool_event_too_long_is_counted) {
@@ -290,11 +358,14 @@ TEST(test_spool_disk_full_at_any_byte_loses_nothing) {
         (void)setrlimit(RLIMIT_FSIZE, &small);
         for (unsigned i = 1; i <= 6; i++) {
             add(i);
+            settle();
         }
         mqtt_spool_confirm(&spool, 1);
+        settle();
         (void)setrlimit(RLIMIT_FSIZE, &before);
         expect(2, 6);
         mqtt_spool_poll(&spool);
+        settle();
         TEST_ASSERT_FALSE(spool.behind);
         reopen();
         expect(2, 6);
@@ -306,10 +377,13 @@ TEST(test_spool_disk_full_and_killed_retains_written_events) {
     (void)getrlimit(RLIMIT_FSIZE, &before);
     (void)signal(SIGXFSZ, SIG_IGN);
     add(1);
+    settle();
     const struct rlimit small = {100, before.rlim_max};
     (void)setrlimit(RLIMIT_FSIZE, &small);
     add(2);
+    settle();
     add(3);
+    settle();
     TEST_ASSERT_TRUE(spool.behind);
     (void)setrlimit(RLIMIT_FSIZE, &before);
     reopen(); // Closing writes nothing, as a kill does.
@@ -317,14 +391,81 @@ TEST(test_spool_disk_full_and_killed_retains_written_events) {
     expect(1, (unsigned)spool.waiting);
 }
 
-TEST(test_spool_sync_writes_to_the_disk_without_waiting) {
-    add(1);
-    TEST_ASSERT_TRUE(spool.unsynced);
+TEST(test_spool_all_calls_to_the_disk_are_made_by_its_thread) {
+    reopen();
+    for (unsigned i = 1; i <= COUNT; i++) {
+        add(i);
+        mqtt_spool_confirm(&spool, i / 2U);
+        mqtt_spool_sync(&spool);
+    }
+    atomic_store(&disk.breaks, true);
     mqtt_spool_sync(&spool);
-    TEST_ASSERT_FALSE(spool.unsynced);
-    TEST_ASSERT_TRUE(mqtt_spool_close(&spool));
-    TEST_ASSERT_TRUE(mqtt_spool_open(&spool, folder, SMALL));
-    expect(1, 1);
+    mqtt_spool_poll(&spool);
+    settle();
+    atomic_store(&disk.breaks, false);
+    mqtt_spool_poll(&spool);
+    reopen();
+    TEST_ASSERT_EQUAL_UINT(0, atomic_load(&disk.by_caller));
+    TEST_ASSERT_GREATER_THAN_UINT(0, atomic_load(&disk.syncs));
+}
+
+/// If a call waits for this disk, the test does not end.
+TEST(test_spool_disk_that_hangs_delays_no_caller) {
+    settle();
+    atomic_store(&disk.hangs, true);
+    add(1);
+    mqtt_spool_sync(&spool);
+    TEST_ASSERT_FALSE(spool.behind);
+    for (unsigned i = 2; i <= COUNT; i++) { // More than the file may hold: it is written again.
+        add(i);
+        mqtt_spool_confirm(&spool, i - 1U);
+        mqtt_spool_sync(&spool);
+    }
+    for (unsigned i = 0; i < 6U; i++) {
+        mqtt_spool_poll(&spool);
+    }
+    TEST_ASSERT_TRUE_MESSAGE(spool.behind, "a disk that does not answer is reported");
+    TEST_ASSERT_FALSE_MESSAGE(mqtt_spool_close(&spool), "the thread still uses the memory");
+    atomic_store(&disk.hangs, false);
+    settle();
+    TEST_ASSERT_FALSE(spool.behind);
+    expect(COUNT, COUNT);
+    reopen();
+    expect(COUNT, COUNT);
+}
+
+TEST(test_spool_disk_that_fails_is_written_again_once_it_works) {
+    char bytes[1024];
+    settle();
+    atomic_store(&disk.breaks, true);
+    add(1);
+    settle();
+    TEST_ASSERT_TRUE(spool.behind);
+    add(2);
+    mqtt_spool_poll(&spool);
+    settle();
+    TEST_ASSERT_TRUE(spool.behind);
+    atomic_store(&disk.breaks, false);
+    add(3);
+    settle();
+    TEST_ASSERT_TRUE_MESSAGE(spool.behind, "an addition alone does not complete the file");
+    mqtt_spool_poll(&spool);
+    settle();
+    TEST_ASSERT_FALSE(spool.behind);
+    TEST_ASSERT_GREATER_THAN_size_t(0, read_all(bytes, sizeof bytes));
+    reopen();
+    expect(1, 3);
+}
+
+TEST(test_spool_event_is_on_the_disk_before_the_thread_rests) {
+    settle();
+    const unsigned before = atomic_load(&disk.syncs);
+    add(1);
+    settle();
+    TEST_ASSERT_EQUAL_UINT(before + 1U, atomic_load(&disk.syncs));
+    mqtt_spool_confirm(&spool, 1);
+    settle();
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(before + 1U, atomic_load(&disk.syncs), "a confirmation needs no sync");
 }
 
 TEST(test_spool_open_in_another_process_is_refused) {

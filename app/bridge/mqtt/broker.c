@@ -171,6 +171,14 @@ static void lose(mqtt_broker_t *self, const char *why) {
     }
 }
 
+/// Opens the files of TLS, which may wait for their disk.
+static bool set_tls(struct mosquitto *client, const mqtt_settings_t *settings) {
+    const bool certificate = mqtt_settings_given(settings->broker.certificate);
+    return !mqtt_settings_given(settings->broker.ca) ||
+           mosquitto_tls_set(client, settings->broker.ca, NULL, certificate ? settings->broker.certificate : NULL,
+                             certificate ? settings->broker.key : NULL, NULL) == MOSQ_ERR_SUCCESS;
+}
+
 /// Thread that connects. libmosquitto requires that no other thread uses the same client.
 static void *call(void *context) {
     mqtt_caller_t *caller = context;
@@ -183,7 +191,8 @@ static void *call(void *context) {
     if (caller->guarded) { // Before any secret is sent.
         caller->peer = mqtt_peer_probe(caller->host, port, &caller->allowed, address, &caller->uid);
     }
-    if (caller->peer == MQTT_PEER_ALLOWED) {
+    caller->no_tls = caller->peer == MQTT_PEER_ALLOWED && !set_tls(caller->client, caller->settings);
+    if (caller->peer == MQTT_PEER_ALLOWED && !caller->no_tls) {
         caller->result = mosquitto_connect(caller->client, address, port, caller->keepalive_s);
     }
     caller->error = errno;
@@ -203,8 +212,6 @@ static bool is_5(const mqtt_broker_t *self) {
 }
 
 static bool set_up(mqtt_broker_t *self) {
-    const mqtt_settings_t *settings = self->settings;
-    const bool certificate = mqtt_settings_given(settings->broker.certificate);
     const char *will = self->listener.will;
     self->client = mosquitto_new(self->listener.name, true, self);
     if (self->client == NULL) {
@@ -221,11 +228,7 @@ static bool set_up(mqtt_broker_t *self) {
                                 is_5(self) ? MQTT_PROTOCOL_V5 : MQTT_PROTOCOL_V311) == MOSQ_ERR_SUCCESS &&
            (will == NULL || mosquitto_will_set(self->client, will, 7, "offline", 1, true) == MOSQ_ERR_SUCCESS) &&
            (self->user == NULL ||
-            mosquitto_username_pw_set(self->client, self->user, self->password) == MOSQ_ERR_SUCCESS) &&
-           (!mqtt_settings_given(settings->broker.ca) ||
-            mosquitto_tls_set(self->client, settings->broker.ca, NULL,
-                              certificate ? settings->broker.certificate : NULL,
-                              certificate ? settings->broker.key : NULL, NULL) == MOSQ_ERR_SUCCESS);
+            mosquitto_username_pw_set(self->client, self->user, self->password) == MOSQ_ERR_SUCCESS);
 }
 
 static void begin_connecting(mqtt_broker_t *self) {
@@ -240,10 +243,11 @@ static void begin_connecting(mqtt_broker_t *self) {
     self->lost = false;
     self->refusal = 0;
     if (!set_up(self)) {
-        lose(self, "cannot create the MQTT client; check certificate and key, and free memory");
+        lose(self, "cannot create the MQTT client; check the free memory");
         return;
     }
     self->caller.client = self->client;
+    self->caller.settings = self->settings;
     self->caller.host = self->host;
     self->caller.guarded = mqtt_settings_guarded(self->settings) && mqtt_settings_is_local(self->host);
     self->caller.port = (int)self->settings->broker.port;
@@ -275,6 +279,10 @@ static void end_connecting(mqtt_broker_t *self) {
     }
     if (self->caller.peer == MQTT_PEER_UNKNOWN) {
         lose(self, "the kernel names no owner of its process: it may be in a container; use TLS, with ca");
+        return;
+    }
+    if (self->caller.no_tls) {
+        lose(self, "cannot use the files of TLS; check ca, certificate and key");
         return;
     }
     if (self->caller.result != MOSQ_ERR_SUCCESS) {

@@ -7,7 +7,8 @@
 /// "Not now" and "never" differ: the caller sends a message again that cannot be sent now. If this broker does not
 /// accept a message (size, rights), the caller is informed and the connection stays.
 ///
-/// CONNECTING resolves names and shakes hands, which may wait: a separate thread does this and changes nothing else.
+/// CONNECTING opens the files of TLS, resolves names and shakes hands, which may wait: a separate thread does this and
+/// changes nothing else.
 /// Sessions are clean: the broker stores nothing for this machine while it is away, so no command arrives late.
 #ifndef MQTT_BROKER_H
 #define MQTT_BROKER_H
@@ -48,9 +49,11 @@ typedef enum { MQTT_AWAY, MQTT_CONNECTING, MQTT_GREETING, MQTT_UP } mqtt_broker_
 /// Data of the thread that connects.
 typedef struct {
     struct mosquitto *client;
+    const mqtt_settings_t *settings;
     const char *host;
     int port;
     int keepalive_s;
+    bool no_tls; ///< The files of TLS cannot be used.
     int result;
     int error;
     bool guarded;         ///< The process of the broker is judged before and after the connection.

@@ -25,9 +25,10 @@ static int loop(mqtt_bridge_t *bridge) {
         }
         bool writes = false;
         struct pollfd waits[] = {{bridge_link_fd(&bridge->link), POLLIN, 0},
-                                 {mqtt_broker_fd(&bridge->broker, &writes), POLLIN, 0}};
+                                 {mqtt_broker_fd(&bridge->broker, &writes), POLLIN, 0},
+                                 {mqtt_spool_fd(&bridge->spool), POLLIN, 0}};
         waits[1].events = (short)(POLLIN | (writes ? POLLOUT : 0));
-        goes_on = bridge_service_wait(waits, 2, mqtt_bridge_wait_ms(bridge));
+        goes_on = bridge_service_wait(waits, 3, mqtt_bridge_wait_ms(bridge));
         bridge_service_round(&service, bridge_now_us());
     }
     bridge_service_notify(&service, "STOPPING=1");
@@ -51,7 +52,7 @@ static int run(const mqtt_settings_t *settings) {
     }
     code = loop(&bridge);
     if (!mqtt_bridge_close(&bridge)) {
-        _exit(code); // A thread still waits for the network and uses the memory.
+        _exit(code); // A thread still waits for the network or the disk, and uses the memory.
     }
     return code;
 }

@@ -7,16 +7,12 @@
 #include "iwheel_northbound/line.h"
 
 #include <errno.h>
-#include <fcntl.h>
-#include <pthread.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/file.h>
 #include <unistd.h>
 
 static const char magic[8] = {'i', 'w', 's', 'p', 'o', 'o', 'l', '1'};
-static const char fresh[] = MQTT_SPOOL_FILE ".new";
 
 /// A record: length after the head and CRC-32 (head); then a letter, a number and the mark; for an event also its name
 /// with a NUL, and its payload. A CONFIRMED record has the number up to which events are confirmed.
@@ -28,6 +24,12 @@ static const char fresh[] = MQTT_SPOOL_FILE ".new";
 #define EVENT     'e'
 #define ASIDE     'r' ///< An event that the broker does not accept. When a file is read it becomes an EVENT.
 #define DONE_SIZE (HEAD_SIZE + BODY_SIZE)
+/// Space of a job beyond a whole file, for records that are added before the thread receives it.
+#define JOB_SLACK (8U * (size_t)MQTT_SPOOL_EVENT_MAX)
+/// A job that the thread has in so many polls in a row is late: waiting events are not on the disk.
+#define LATE_POLLS 5U
+#define CLOSE_MS   10
+#define CLOSE_MAX  100 ///< At most a second in all.
 /// Largest number of an event, so that one more is always possible.
 #define NUMBER_MAX ((uint64_t)INT64_MAX)
 
@@ -136,77 +138,34 @@ bool mqtt_spool_after(const mqtt_spool_t *self, uint64_t number, mqtt_spool_even
     return false;
 }
 
-static bool write_all(int file, const void *bytes, size_t length) {
-    const uint8_t *at = bytes;
-    while (length > 0U) {
-        const ssize_t written = write(file, at, length);
-        if (written < 0 && errno == EINTR) {
-            continue;
-        }
-        if (written <= 0) {
-            return false;
-        }
-        at += written;
-        length -= (size_t)written;
-    }
-    return true;
-}
-
-static void close_file(mqtt_spool_t *self) {
-    if (self->file >= 0) {
-        (void)close(self->file);
-    }
-    self->file = -1;
-}
-
-/// Writes the whole spool into a new file, which then replaces the old one. A complete file exists at any time.
-static bool rewrite(mqtt_spool_t *self) {
+/// Collects the whole spool as a new file. It replaces everything that was collected before.
+static void rewrite(mqtt_spool_t *self) {
     uint8_t first[DONE_SIZE];
     uint8_t last[DONE_SIZE];
     const bool empty = self->begin == self->end;
-    (void)unlinkat(self->folder, fresh, 0);
-    const int file = openat(self->folder, fresh, O_CREAT | O_EXCL | O_WRONLY | O_NOFOLLOW | O_CLOEXEC, 0600);
+    const size_t size = self->end - self->begin;
     seal(self, first, CONFIRMED, empty ? self->last : number_of(self->data + self->begin) - 1U, 0);
     seal(self, last, ACCEPTED, self->last,
          0); // The newest event is the last record, unless it was confirmed before an older one.
     const bool gone = empty || place_of(self, self->last) == self->end;
-    const bool good = file >= 0 && write_all(file, magic, sizeof magic) && write_all(file, first, sizeof first) &&
-                      write_all(file, self->data + self->begin, self->end - self->begin) &&
-                      write_all(file, last, gone ? sizeof last : 0U) && fdatasync(file) == 0 &&
-                      renameat(self->folder, fresh, self->folder, MQTT_SPOOL_FILE) == 0;
-    if (!good) {
-        if (file >= 0) {
-            (void)close(file);
-            (void)unlinkat(self->folder, fresh, 0);
-        }
-        self->behind = true;
-        return false;
-    }
-    (void)fsync(self->folder);
-    close_file(self);
-    self->file = file;
-    self->file_bytes = sizeof magic + sizeof first + self->end - self->begin + (gone ? sizeof last : 0U);
-    self->behind = false;
-    self->unsynced = false;
-    return true;
+    mqtt_disk_begin(&self->disk); // A job has space for all of this.
+    (void)mqtt_disk_put(&self->disk, magic, sizeof magic, true);
+    (void)mqtt_disk_put(&self->disk, first, sizeof first, true);
+    (void)mqtt_disk_put(&self->disk, self->data + self->begin, size, true);
+    (void)mqtt_disk_put(&self->disk, last, gone ? sizeof last : 0U, true);
+    self->file_bytes = sizeof magic + sizeof first + size + (gone ? sizeof last : 0U);
 }
 
-/// Appends a record. An incomplete record is removed, because records after it would not be read.
-static bool append(mqtt_spool_t *self, const uint8_t *record, size_t length) {
-    if (self->behind || self->file_bytes + length > 2U * self->size) {
-        return rewrite(self);
+/// Collects a record for the file. While the file lacks something, `poll` writes it again with this record.
+static void append(mqtt_spool_t *self, const uint8_t *record, size_t length, bool synced) {
+    if (self->failed) {
+        return;
     }
-    if (!write_all(self->file, record, length)) {
-        self->behind = true;
-        if (ftruncate(self->file, (off_t)self->file_bytes) == 0 &&
-            lseek(self->file, (off_t)self->file_bytes, SEEK_SET) >= 0) {
-            return false;
-        }
-        close_file(self);
-        return false;
+    if (self->file_bytes + length > 2U * self->size || !mqtt_disk_put(&self->disk, record, length, synced)) {
+        rewrite(self);
+        return;
     }
     self->file_bytes += length;
-    return true;
 }
 
 static size_t read_event(mqtt_spool_t *self, const uint8_t *record, size_t length) {
@@ -274,39 +233,55 @@ static void read_file(mqtt_spool_t *self, int file) {
     }
 }
 
-bool mqtt_spool_open(mqtt_spool_t *self, const char *directory, size_t max_bytes) {
-    *self = (mqtt_spool_t){.folder = mqtt_folder_open(directory), .file = -1};
-    self->size = (max_bytes > SIZE_MIN) ? max_bytes : SIZE_MIN;
-    const bool ours = self->folder >= 0 && flock(self->folder, LOCK_EX | LOCK_NB) == 0;
-    const int file = ours ? mqtt_folder_open_file(self->folder, MQTT_SPOOL_FILE) : -1;
-    self->data = (ours && (file >= 0 || errno == ENOENT)) ? malloc(self->size) : NULL;
-    if (self->data == NULL) {
-        const int error = errno;
-        if (file >= 0) {
-            (void)close(file);
-        }
-        (void)mqtt_spool_close(self);
-        errno = error;
-        return false;
-    }
-    read_file(self, file);
-    (void)rewrite(self);
-    return true;
-}
-
-bool mqtt_spool_close(mqtt_spool_t *self) {
-    for (int i = 0; i < 100 && atomic_load(&self->sync.state) == MQTT_SYNC_BUSY; i++) {
-        (void)usleep(10000);
-    }
-    const bool done = atomic_load(&self->sync.state) != MQTT_SYNC_BUSY;
-    close_file(self);
+static void release(mqtt_spool_t *self) {
     if (self->folder >= 0) {
         (void)close(self->folder);
     }
     self->folder = -1;
     free(self->data);
     self->data = NULL;
-    return done;
+}
+
+bool mqtt_spool_open(mqtt_spool_t *self, const char *directory, size_t max_bytes) {
+    *self = (mqtt_spool_t){.folder = mqtt_folder_open(directory)};
+    self->size = (max_bytes > SIZE_MIN) ? max_bytes : SIZE_MIN;
+    const bool ours = self->folder >= 0 && flock(self->folder, LOCK_EX | LOCK_NB) == 0;
+    const int file = ours ? mqtt_folder_open_file(self->folder, MQTT_SPOOL_FILE) : -1;
+    self->data = (ours && (file >= 0 || errno == ENOENT)) ? malloc(self->size) : NULL;
+    if (self->data == NULL ||
+        !mqtt_disk_open(&self->disk, self->folder, sizeof magic + 2U * DONE_SIZE + self->size + JOB_SLACK)) {
+        const int error = errno;
+        if (file >= 0) {
+            (void)close(file);
+        }
+        release(self);
+        errno = error;
+        return false;
+    }
+    read_file(self, file);
+    rewrite(self);
+    mqtt_disk_give(&self->disk);
+    return true;
+}
+
+bool mqtt_spool_flush(mqtt_spool_t *self) {
+    mqtt_spool_sync(self);
+    for (int i = 0; i < CLOSE_MAX && (self->busy || mqtt_disk_has_more(&self->disk)); i++) {
+        mqtt_disk_wait(&self->disk, CLOSE_MS);
+        mqtt_spool_sync(self);
+    }
+    return !self->busy;
+}
+
+bool mqtt_spool_close(mqtt_spool_t *self) {
+    if (self->data == NULL) {
+        return true;
+    }
+    if (!mqtt_spool_flush(self) || !mqtt_disk_close(&self->disk)) {
+        return false;
+    }
+    release(self);
+    return true;
 }
 
 bool mqtt_spool_add(mqtt_spool_t *self, const char *name, const char *payload, size_t length, uint64_t mark) {
@@ -324,14 +299,14 @@ bool mqtt_spool_add(mqtt_spool_t *self, const char *name, const char *payload, s
     seal(self, record, EVENT, self->last, rest);
     self->end += HEAD_SIZE + BODY_SIZE + rest;
     self->waiting++;
-    self->unsynced = append(self, record, HEAD_SIZE + BODY_SIZE + rest) || self->unsynced;
+    append(self, record, HEAD_SIZE + BODY_SIZE + rest, true);
     return true;
 }
 
 static void append_done(mqtt_spool_t *self, uint8_t letter, uint64_t number) {
     uint8_t done[DONE_SIZE];
     seal(self, done, letter, number, 0);
-    (void)append(self, done, sizeof done);
+    append(self, done, sizeof done, false);
 }
 
 void mqtt_spool_confirm(mqtt_spool_t *self, uint64_t number) {
@@ -363,37 +338,41 @@ void mqtt_spool_confirm_aside(mqtt_spool_t *self, uint64_t number) {
     append_done(self, ACCEPTED, number);
 }
 
-void mqtt_spool_poll(mqtt_spool_t *self) {
-    if (self->behind) {
-        (void)rewrite(self);
+/// Receives the result of the thread.
+static void settle(mqtt_spool_t *self) {
+    bool whole = false;
+    const mqtt_disk_state_t state = mqtt_disk_result(&self->disk, &whole);
+    self->busy = state == MQTT_DISK_BUSY;
+    if (state == MQTT_DISK_FAILED) {
+        self->failed = true;
+        mqtt_disk_drop(&self->disk);
+    } else if (state == MQTT_DISK_DONE && whole) {
+        self->failed = false;
     }
-}
-
-static void *sync_file(void *context) {
-    mqtt_sync_t *sync = context;
-    const bool good = fdatasync(sync->file) == 0;
-    (void)close(sync->file);
-    atomic_store(&sync->state, good ? MQTT_SYNC_IDLE : MQTT_SYNC_FAILED);
-    return NULL;
+    if (!self->busy) {
+        self->busy_polls = 0;
+    }
+    self->behind = self->failed || self->busy_polls >= LATE_POLLS;
 }
 
 void mqtt_spool_sync(mqtt_spool_t *self) {
-    pthread_t thread;
-    pthread_attr_t attributes;
-    if (atomic_load(&self->sync.state) == MQTT_SYNC_FAILED) {
-        atomic_store(&self->sync.state, MQTT_SYNC_IDLE);
-        self->behind = true;
+    settle(self);
+    if (!self->busy && mqtt_disk_has_more(&self->disk)) {
+        mqtt_disk_give(&self->disk);
+        self->busy = true;
     }
-    if (!self->unsynced || self->behind || atomic_load(&self->sync.state) != MQTT_SYNC_IDLE) {
-        return;
+}
+
+void mqtt_spool_poll(mqtt_spool_t *self) {
+    settle(self);
+    if (self->busy) {
+        self->busy_polls++;
+    } else if (self->failed) {
+        rewrite(self);
     }
-    self->sync.file = fcntl(self->file, F_DUPFD_CLOEXEC, 0);
-    atomic_store(&self->sync.state, MQTT_SYNC_BUSY);
-    self->unsynced = false;
-    (void)pthread_attr_init(&attributes);
-    (void)pthread_attr_setdetachstate(&attributes, PTHREAD_CREATE_DETACHED);
-    if (self->sync.file < 0 || pthread_create(&thread, &attributes, sync_file, &self->sync) != 0) {
-        (void)sync_file(&self->sync);
-    }
-    (void)pthread_attr_destroy(&attributes);
+    mqtt_spool_sync(self);
+}
+
+int mqtt_spool_fd(const mqtt_spool_t *self) {
+    return self->disk.wake;
 }
