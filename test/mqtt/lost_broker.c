@@ -136,6 +136,32 @@ static void test_sender_has_no_lease_after_the_gateway_restarted(void) {
     TEST_ASSERT_TRUE(daemon_rig_commands_zero());
 }
 
+/// The gateway hangs: its connection stays, and nothing arrives.
+static void pass_hung(unsigned for_ms) {
+    for (unsigned ms = 0; ms < for_ms; ms += PASS_MS) {
+        daemon_rig.now_us += PASS_MS * 1000U;
+        TEST_ASSERT_EQUAL_INT(0, mqtt_bridge_step(&bridge, daemon_rig.now_us));
+    }
+}
+
+static void test_gateway_that_hangs_is_offline_after_2_s_until_its_next_state(void) {
+    iwc_message_t state;
+    TEST_ASSERT_TRUE(bridge.online);
+    pass(3000);
+    TEST_ASSERT_TRUE_MESSAGE(bridge.online, "states arrive once a second");
+    const uint64_t heard_us = bridge.heard_us;
+    pass_hung((unsigned)((heard_us + MQTT_HUNG_US - daemon_rig.now_us) / 1000U) - 2U * PASS_MS);
+    TEST_ASSERT_TRUE(bridge.online);
+    TEST_ASSERT_LESS_OR_EQUAL_INT((int)(3U * PASS_MS), mqtt_bridge_wait_ms(&bridge));
+    pass_hung(3U * PASS_MS);
+    TEST_ASSERT_FALSE(bridge.online);
+    TEST_ASSERT_FALSE(mqtt_bridge_state(&bridge, &state));
+    TEST_ASSERT_EQUAL_INT_MESSAGE(BRIDGE_LINK_HERE, bridge.link.state, "stops still use the connection");
+    pass(1500);
+    TEST_ASSERT_TRUE(bridge.online);
+    TEST_ASSERT_TRUE(mqtt_bridge_state(&bridge, &state));
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_broker_lost_stops_the_wheels_with_the_cause_client_stop);
@@ -143,5 +169,6 @@ int main(void) {
     RUN_TEST(test_sender_that_has_not_armed_drives_nothing);
     RUN_TEST(test_sender_that_stopped_drives_nothing_without_arm);
     RUN_TEST(test_sender_has_no_lease_after_the_gateway_restarted);
+    RUN_TEST(test_gateway_that_hangs_is_offline_after_2_s_until_its_next_state);
     return UNITY_END();
 }

@@ -49,9 +49,10 @@ static void publish_info(mqtt_bridge_t *self) {
     self->logged_waiting = self->spool.waiting;
 }
 
-/// Publishes the availability. A machine without its gateway is offline.
+/// Publishes the availability. A machine without the states of its gateway is offline.
 static void publish_availability(mqtt_bridge_t *self, bool always) {
-    const bool online = self->link.state == BRIDGE_LINK_HERE && self->state_length > 0U;
+    iwc_message_t state;
+    const bool online = mqtt_bridge_state(self, &state);
     if (online != self->online || always) {
         const size_t length =
             (size_t)snprintf(self->payload, sizeof self->payload, "%s", online ? "online" : "offline");
@@ -147,6 +148,7 @@ static void take_state(mqtt_bridge_t *self, const iwc_message_t *state) {
     const bool first = self->state_length == 0U;
     memcpy(self->state, state->text, state->length);
     self->state_length = state->length;
+    self->heard_us = self->now_us;
     read_condition(state, condition, sizeof condition);
     // Sends half a gateway period early, so that the periods of the gateway and of the bridge do not beat, even if
     // lines arrive unevenly.
@@ -205,13 +207,34 @@ static void gateway_here(void *context, uint64_t now_us) {
     (void)bridge_link_ask(&self->link, "{\"cmd\":\"why\"}", take_why, self, now_us);
 }
 
-static void gateway_gone(void *context, uint64_t now_us) {
-    mqtt_bridge_t *self = context;
+/// Forgets the state, so that the next one is published immediately.
+static void go_offline(mqtt_bridge_t *self) {
     self->state_length = 0;
     self->condition[0] = '\0';
-    bridge_lease_end(&self->lease, now_us);
     publish_availability(self, false);
     publish_info(self);
+}
+
+static void gateway_gone(void *context, uint64_t now_us) {
+    mqtt_bridge_t *self = context;
+    bridge_lease_end(&self->lease, now_us);
+    go_offline(self);
+}
+
+/// Returns the time from which the gateway counts as hung; UINT64_MAX while its state is unknown.
+static uint64_t hung_us(const mqtt_bridge_t *self) {
+    return (self->state_length > 0U) ? self->heard_us + MQTT_HUNG_US : UINT64_MAX;
+}
+
+/// The connection stays, and commands still use it: a stop must reach a gateway that continues.
+static void judge_silence(mqtt_bridge_t *self) {
+    if (self->now_us >= hung_us(self)) {
+        (void)fprintf(stderr,
+                      "iwheel-mqtt: no state from the gateway for %u s: it hangs, and the machine is published as "
+                      "offline; see journalctl -u iwheel-gateway\n",
+                      MQTT_HUNG_US / SECOND_US);
+        go_offline(self);
+    }
 }
 
 static void broker_up(void *context) {
@@ -354,6 +377,7 @@ int mqtt_bridge_step(mqtt_bridge_t *self, uint64_t now_us) {
     self->now_us = now_us;
     mqtt_broker_step(&self->broker, now_us);
     const int code = bridge_link_step(&self->link, now_us);
+    judge_silence(self); // After the link has read: a bridge that was stopped itself reads what waits first.
     bridge_lease_step(&self->lease, now_us);
     if (bridge_lease_key(&self->lease) != NULL && now_us >= self->silent_us) {
         mqtt_bridge_stop_if_ours(self);
@@ -369,8 +393,11 @@ int mqtt_bridge_step(mqtt_bridge_t *self, uint64_t now_us) {
 
 int mqtt_bridge_wait_ms(const mqtt_bridge_t *self) {
     const uint64_t now_us = self->now_us;
-    const uint64_t times[] = {bridge_link_next_us(&self->link, now_us), bridge_lease_next_us(&self->lease, now_us),
-                              mqtt_broker_next_us(&self->broker), self->second_us,
+    const uint64_t times[] = {bridge_link_next_us(&self->link, now_us),
+                              bridge_lease_next_us(&self->lease, now_us),
+                              mqtt_broker_next_us(&self->broker),
+                              self->second_us,
+                              hung_us(self),
                               (bridge_lease_key(&self->lease) != NULL) ? self->silent_us : UINT64_MAX};
     uint64_t next_us = times[0];
     for (size_t i = 1; i < sizeof times / sizeof times[0]; i++) {

@@ -17,6 +17,9 @@
 /// Longest time from `arm` to the first command of the same person, and between two commands.
 #define MQTT_FIRST_US  1000000U
 #define MQTT_SILENT_US 500000U
+/// Without a state of the gateway for this time, the machine is offline although the connection stays: the gateway
+/// hangs. Twice the longest interval of its states.
+#define MQTT_HUNG_US 2000000U
 /// Largest number of events that wait for a confirmation.
 #define MQTT_INFLIGHT_MAX 8U
 /// An event is set aside if the connection ended with it this number of times in a row. With MQTT 3.1.1 some brokers
@@ -90,6 +93,7 @@ typedef struct {
     char condition[128];     ///< Part of a state whose change is sent immediately.
     char state[IWC_LINE_MAX + 1U];
     size_t state_length; ///< 0: unknown.
+    uint64_t heard_us;   ///< Time of the receipt of `state`.
     mqtt_stop_t stop;    ///< Last stop that the gateway reported.
     char payload[MQTT_PAYLOAD_SIZE];
     mqtt_inflight_t inflight[MQTT_INFLIGHT_MAX];
@@ -148,7 +152,7 @@ void mqtt_events_refused(void *context, int message, const char *why);
 /// Sends `stop` once, only if a person holds the lease through this bridge.
 void mqtt_bridge_stop_if_ours(mqtt_bridge_t *self);
 
-/// Writes the newest state of the gateway. Returns false if the gateway is away.
+/// Writes the newest state of the gateway. Returns false if the gateway is away, or has sent none for MQTT_HUNG_US.
 bool mqtt_bridge_state(const mqtt_bridge_t *self, iwc_message_t *out_state);
 
 #endif
