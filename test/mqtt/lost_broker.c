@@ -6,10 +6,14 @@
 
 #include "unity.h"
 
+#include <fcntl.h>
 #include <mosquitto.h>
+#include <pthread.h>
+#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #define PASS_MS 5U
@@ -162,6 +166,43 @@ static void test_gateway_that_hangs_is_offline_after_2_s_until_its_next_state(vo
     TEST_ASSERT_TRUE(mqtt_bridge_state(&bridge, &state));
 }
 
+static atomic_bool readable;
+
+/// After half a second the file is readable, and empty.
+static void *make_readable(void *path) {
+    int pipe = -1;
+    (void)usleep(500000);
+    atomic_store(&readable, true);
+    while (pipe < 0) { // Until it has a reader.
+        (void)usleep(1000);
+        pipe = open(path, O_WRONLY | O_NONBLOCK | O_CLOEXEC);
+    }
+    (void)close(pipe);
+    return NULL;
+}
+
+static void test_tls_file_whose_disk_hangs_delays_no_round(void) {
+    pthread_t writer;
+    char path[96];
+    (void)snprintf(path, sizeof path, "%s/ca.pem", folder);
+    (void)snprintf(settings.broker.ca, sizeof settings.broker.ca, "%s", path);
+    settings.broker.port = 1; // No broker.
+    atomic_store(&readable, false);
+    TEST_ASSERT_EQUAL_INT(0, mkfifo(path, 0600));
+    TEST_ASSERT_EQUAL_INT(0, pthread_create(&writer, NULL, make_readable, path));
+    bridge.broker.try_us = 0;
+    pass(PASS_MS);
+    TEST_ASSERT_FALSE_MESSAGE(atomic_load(&readable), "the loop waited for the file");
+    TEST_ASSERT_EQUAL_INT(MQTT_CONNECTING, bridge.broker.state);
+    TEST_ASSERT_EQUAL_INT(0, pthread_join(writer, NULL));
+    while (!atomic_load(&bridge.broker.caller.ended)) {
+        (void)usleep(1000);
+    }
+    pass(PASS_MS);
+    TEST_ASSERT_EQUAL_INT(MQTT_AWAY, bridge.broker.state);
+    (void)unlink(path);
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_broker_lost_stops_the_wheels_with_the_cause_client_stop);
@@ -170,5 +211,6 @@ int main(void) {
     RUN_TEST(test_sender_that_stopped_drives_nothing_without_arm);
     RUN_TEST(test_sender_has_no_lease_after_the_gateway_restarted);
     RUN_TEST(test_gateway_that_hangs_is_offline_after_2_s_until_its_next_state);
+    RUN_TEST(test_tls_file_whose_disk_hangs_delays_no_round);
     return UNITY_END();
 }

@@ -50,24 +50,17 @@ static bool replace(mqtt_disk_t *self, const mqtt_job_t *job) {
     (void)fsync(self->folder);
     close_file(self);
     self->file = file;
-    self->file_bytes = job->used;
     return true;
 }
 
-/// An incomplete job is removed from the file, because records after an incomplete one would not be read.
+/// Nothing is appended after a job that failed, because records after an incomplete one would not be read.
 static bool append(mqtt_disk_t *self, const mqtt_job_t *job) {
-    if (self->file < 0) {
-        return false;
+    const bool good =
+        self->file >= 0 && write_all(self->file, job->bytes, job->used) && (!job->synced || fdatasync(self->file) == 0);
+    if (!good) {
+        close_file(self);
     }
-    if (!write_all(self->file, job->bytes, job->used)) {
-        if (ftruncate(self->file, (off_t)self->file_bytes) != 0 ||
-            lseek(self->file, (off_t)self->file_bytes, SEEK_SET) < 0) {
-            close_file(self);
-        }
-        return false;
-    }
-    self->file_bytes += job->used;
-    return !job->synced || fdatasync(self->file) == 0;
+    return good;
 }
 
 static void *serve(void *context) {

@@ -43,8 +43,7 @@ typedef struct {
     int wake;         ///< Readable after a job has ended.
     sem_t given;
     pthread_t thread;
-    int file;          ///< Thread: descriptor; -1: none.
-    size_t file_bytes; ///< Thread: bytes of complete jobs in the file.
+    int file; ///< Thread: descriptor; -1: none.
 } mqtt_disk_t;
 
 /// Starts the thread. `size`: largest job in bytes. Writes nothing: the first job must be whole. Returns false with
