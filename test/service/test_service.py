@@ -149,6 +149,11 @@ class Units(unittest.TestCase):
         self.assertEqual(values(ROS2, "MemoryMax"), ["64M"])
         self.assertEqual(re.findall(r"^network = (\w+)", read("ros2.conf"), re.MULTILINE), ["loopback"])
 
+    def test_mqtt_bridge_has_memory_for_its_largest_spool(self):
+        largest_kB = int(re.search(r"^max_kB = .*; 64\.\.(\d+) kB", read("mqtt.conf"), re.MULTILINE)[1])
+        limit = values(MQTT, "MemoryMax")[0]
+        self.assertGreater(int(limit.removesuffix("M")) << 20, 3 * largest_kB * 1000 + 16_000_000, limit)
+
     def test_programs_without_a_network_may_have_none(self):
         for unit in (*GATEWAYS, SERIAL):
             self.assertEqual(values(unit, "IPAddressDeny"), ["any"], unit)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// The whole bridge: a client of the gateway and of an MQTT broker, in one thread that waits for neither.
+/// The whole bridge: a client of the gateway and of an MQTT broker, in one thread that waits for neither, nor for a disk.
 ///
 /// It repeats no command and passes each on at most once. So the wheels stop by the lease of the gateway, however the
 /// bridge ends. If the person who drives sends nothing more, or the broker is gone, the bridge sends `stop` once if it
