@@ -143,7 +143,7 @@ static void test_sender_has_no_lease_after_the_gateway_restarted(void) {
 /// The gateway hangs: its connection stays, and nothing arrives.
 static void pass_hung(unsigned for_ms) {
     for (unsigned ms = 0; ms < for_ms; ms += PASS_MS) {
-        daemon_rig.now_us += PASS_MS * 1000U;
+        daemon_rig.now_us += MS(PASS_MS);
         TEST_ASSERT_EQUAL_INT(0, mqtt_bridge_step(&bridge, daemon_rig.now_us));
     }
 }

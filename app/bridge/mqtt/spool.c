@@ -249,7 +249,7 @@ bool mqtt_spool_open(mqtt_spool_t *self, const char *directory, size_t max_bytes
     const int file = ours ? mqtt_folder_open_file(self->folder, MQTT_SPOOL_FILE) : -1;
     self->data = (ours && (file >= 0 || errno == ENOENT)) ? malloc(self->size) : NULL;
     if (self->data == NULL ||
-        !mqtt_disk_open(&self->disk, self->folder, sizeof magic + 2U * DONE_SIZE + self->size + JOB_SLACK)) {
+        !mqtt_disk_open(&self->disk, self->folder, sizeof magic + DONE_SIZE + DONE_SIZE + self->size + JOB_SLACK)) {
         const int error = errno;
         if (file >= 0) {
             (void)close(file);
