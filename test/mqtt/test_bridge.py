@@ -35,7 +35,7 @@ int clock_gettime(clockid_t clock, struct timespec *now) {
 }
 """
 
-# A disk of the spool that answers nothing for 3 s and then fails. What is written is counted by thread: the first word is that of the main thread.
+# A disk that answers nothing for 3 s and then fails. Calls of the main thread that wait for it are reported on stderr.
 SLOW_DISK = r"""
 #define _GNU_SOURCE
 #include <dlfcn.h>
