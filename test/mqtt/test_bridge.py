@@ -160,6 +160,13 @@ def test_state_is_sent_on_change_else_at_configured_interval(rig):
     assert time.monotonic() - begun < 1.5
 
 
+@pytest.mark.rig(settings={"state": {"every_ms": 60000}})
+def test_wheels_that_roll_are_sent_at_once(rig):
+    far = rig.start_online()
+    rig.sim.ask("push both 20")
+    until(lambda: [state for state in far.messages("state") if state["rolling"]], 3, "a state that rolls")
+
+
 def test_gateway_gone_or_bridge_killed_is_published_offline(rig):
     far = rig.start_online()
     rig.gateway.signal(signal.SIGKILL)
@@ -203,10 +210,10 @@ def test_home_assistant_gets_sensors_that_are_in_the_state(rig):
     rig.online(ha)
     reply = until(
         lambda: (
-            len([1 for topic, *_ in ha.all if topic.startswith("homeassistant/")]) == 10
+            len([1 for topic, *_ in ha.all if topic.startswith("homeassistant/")]) == 11
             and [(topic, json.loads(payload), retain) for topic, payload, retain, _ in ha.all if topic.startswith("homeassistant/")]
         ),
-        what="ten sensors",
+        what="eleven sensors",
     )
     state = until(lambda: ha.messages("state"), what="a state")[-1]
     for topic, config, _ in reply:
@@ -223,7 +230,7 @@ def test_home_assistant_gets_sensors_that_are_in_the_state(rig):
         assert config["origin"]["name"] == "iwheel-mqtt" and config["origin"]["sw_version"], config
         measured = config.get("unit_of_measurement") is not None
         assert (config.get("state_class") in ("measurement", "total")) == measured, f"a number has statistics, a text has none: {config}"
-    assert len({config["unique_id"] for _, config, _ in reply}) == 10
+    assert len({config["unique_id"] for _, config, _ in reply}) == 11
     lines = {"released": "OFF", "pressed": "ON", "unreadable": "ON", "disagrees": "ON", "none": "None"}
     buses = {"active": "OFF", "passive": "OFF", "bus_off": "ON", "down": "ON"}
     for sensor, states in (("estop", lines), ("bus", buses)):
@@ -232,7 +239,7 @@ def test_home_assistant_gets_sensors_that_are_in_the_state(rig):
         for value, shown in states.items():
             assert jinja.render(value_json={sensor: {"state": value}}) == shown, f"{value}: Home Assistant shows None as unknown"
     assert rig.far("later", topics=("homeassistant/#",)) and until(
-        lambda: len(rig.fars[-1].all) == 10 and all(retain for _, _, retain, _ in rig.fars[-1].all), what="retained"
+        lambda: len(rig.fars[-1].all) == 11 and all(retain for _, _, retain, _ in rig.fars[-1].all), what="retained"
     )
 
 

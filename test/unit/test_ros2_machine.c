@@ -307,6 +307,10 @@ TEST(test_diagnosis_each_stop_has_its_sentence_and_fix) {
     facts.machine.now.machine = IWC_LATCHED;
     (void)snprintf(facts.machine.stop, sizeof facts.machine.stop, "the left wheel was lost");
     expect(ROS_REPORT_GATEWAY, ROS_ERROR, "the left wheel was lost; remove the cause, reset");
+    facts.machine.rolling = true;
+    expect(ROS_REPORT_GATEWAY, ROS_ERROR,
+           "hold the machine, or use its parking brake; stopped and latched: the left wheel was lost");
+    facts.machine.rolling = false;
     facts.machine.now.machine = IWC_STOPPING;
     expect(ROS_REPORT_GATEWAY, ROS_WARN, "stopping: the left wheel was lost");
     facts.machine.holding = true;

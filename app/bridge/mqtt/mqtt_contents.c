@@ -207,6 +207,7 @@ static const sensor_t sensors[] = {
     {"binary_sensor", "estop", "Emergency stop pressed",
      "None if value_json.estop.state == 'none' else 'OFF' if value_json.estop.state == 'released' else 'ON'", NULL,
      "problem"},
+    {"binary_sensor", "rolling", "Rolls without command", "'ON' if value_json.rolling else 'OFF'", NULL, "safety"},
     {"binary_sensor", "bus", "Bus down", "'OFF' if value_json.bus.state in ['active', 'passive'] else 'ON'", NULL,
      "problem"},
     {"sensor", "battery_left", "Battery left",

@@ -30,6 +30,8 @@ static const char *word(iwc_machine_t machine) {
 }
 
 static void report_gateway(const ros_facts_t *facts, ros_status_t *status) {
+    static const char rolls[] =
+        "a wheel turns although the gateway sends nothing to it: hold the machine, or use its parking brake";
     const ros_machine_t *machine = &facts->machine;
     add(status, "lease_ms", true, machine->lease_ms);
     add(status, "odometry_restarts", true, facts->odometry_restarts);
@@ -41,6 +43,8 @@ static void report_gateway(const ros_facts_t *facts, ros_status_t *status) {
             facts->trouble);
     } else if (facts->link == ROS_LINK_SILENT) {
         set(status, ROS_ERROR, "the gateway does not answer; see its log (journalctl -u iwheel-gateway)");
+    } else if (machine->now.machine == IWC_LATCHED && machine->rolling) {
+        set(status, ROS_ERROR, "%s; stopped and latched: %s", rolls, machine->stop);
     } else if (machine->now.machine == IWC_LATCHED) {
         set(status, ROS_ERROR, "stopped and latched: %s; remove the cause, reset (iwheelctl reset), then arm again",
             machine->stop);
@@ -52,8 +56,7 @@ static void report_gateway(const ros_facts_t *facts, ros_status_t *status) {
     } else if (machine->now.machine == IWC_ARMED) {
         set(status, ROS_OK, "armed by %s", machine->now.ours ? "this bridge" : machine->holder);
     } else if (machine->rolling) {
-        set(status, ROS_WARN,
-            "a wheel turns although the gateway sends nothing to it: hold the machine, or use its parking brake");
+        set(status, ROS_WARN, "%s", rolls);
     } else if (machine->stop[0] != '\0') {
         set(status, ROS_OK, "listening, call iwheel/arm to drive; the last stop: %s", machine->stop);
     } else {
