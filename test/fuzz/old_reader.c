@@ -346,6 +346,15 @@ static bool is_complete(const json_t *root, const iwn_request_t *request, iwn_re
     return true;
 }
 
+/// Removes the name of an option of jansson, which has no meaning for a client.
+static void drop_option(char *text) {
+    static const char option[] = " without JSON_ALLOW_NUL";
+    char *const found = strstr(text, option);
+    if (found != NULL) {
+        memmove(found, &found[sizeof option - 1U], strlen(&found[sizeof option - 1U]) + 1U);
+    }
+}
+
 bool old_request_read(const char *line, size_t length, iwn_request_t *out_request, iwn_refusal_t *out_refusal) {
     *out_request = (iwn_request_t){.rate_hz = IWN_RATE_DEFAULT_HZ, .sides = IW_SIDES_BOTH};
     if (length > IWN_LINE_MAX) {
@@ -363,6 +372,7 @@ bool old_request_read(const char *line, size_t length, iwn_request_t *out_reques
     }
     used = 0;
     json_t *root = json_loadb(line, length, JSON_REJECT_DUPLICATES, &error);
+    drop_option(error.text);
     if (!json_is_object(root)) {
         const char *reason = (root == NULL) ? error.text : "it is not an object";
         return refuse(out_refusal, IWN_BAD_JSON, "not one JSON object on one line: %s", quotable(reason, "unreadable"));

@@ -125,7 +125,7 @@ static bool open_container(check_t *self, int *token) {
 
 static bool check_scalar(check_t *self, int token) {
     if (token == IWN_TOKEN_TEXT && self->scan.has_nul) {
-        return fail(self, "\\u0000 is not allowed without JSON_ALLOW_NUL");
+        return fail(self, "\\u0000 is not allowed");
     }
     if (token == IWN_TOKEN_INVALID) {
         return fail(self, "invalid token");
