@@ -112,7 +112,7 @@ static bool take_request(brd_host_t *self, const iwn_line_t *line) {
     size_t length = line->length;
     iwn_quote_t quote;
     const bool quoted = iwn_quote_take(&json, &length, &quote);
-    if (iwn_request_read(json, length, &self->scratch.work, &self->server.request, &self->server.refusal)) {
+    if (iwn_request_read_short(json, length, &self->scratch.work, &self->server.request, &self->server.refusal)) {
         self->quote = quoted ? &quote : NULL;
         iwn_server_request(&self->server, &client->served);
         self->quote = NULL;

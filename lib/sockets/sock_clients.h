@@ -32,7 +32,8 @@ _Static_assert(SOCK_DRIVERS_MAX == 64U && SOCK_WATCHERS_MAX == 64U, "a word has 
 /// Functions of the owner. Each is called with `context`.
 typedef struct sock_handler {
     void (*welcome)(void *context, sock_client_t *client); ///< A client has connected, also one that may only stop.
-    /// Executes a line. For a closing connection only stop requests.
+    /// Executes a line. For a closing connection only stop requests. A line beyond IWN_LINE_MAX has a stop in it, and is
+    /// refused with it (iwn_request_read).
     void (*carry_out)(void *context, sock_client_t *client, const char *line, size_t length);
     /// Returns true if the line is a stop request: then it precedes a watcher's earlier lines. NULL: none does.
     bool (*stops)(void *context, const char *line, size_t length);

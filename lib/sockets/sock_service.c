@@ -59,12 +59,19 @@ void sock_service_release(sock_clients_t *self, sock_client_t *client) {
         ~(UINT64_C(1) << ((uint32_t)(client - self->client) - sock_parts[client->right].first));
 }
 
+/// Closes the connection. The handler replies if there is a stop in the part that was read.
 static void refuse_long_line(sock_clients_t *self, sock_client_t *client) {
-    const iwn_id_t no_id = {.kind = IWN_ID_NONE};
-    iwn_refusal_t refusal = {.error = IWN_LINE_TOO_LONG};
-    (void)snprintf(refusal.message, sizeof refusal.message,
-                   "a request has at most %u bytes and ends with a newline; the connection is closed", IWN_LINE_MAX);
-    sock_clients_refuse(self, client, &no_id, &refusal);
+    iwn_request_t request;
+    iwn_refusal_t refusal;
+    if (iwn_request_read(client->in, client->in_length, NULL, &request, &refusal)) {
+        sock_client_finish(client, self->now_us);
+        self->handler.carry_out(self->handler.context, client, client->in, client->in_length);
+    } else {
+        (void)snprintf(refusal.message, sizeof refusal.message,
+                       "a request has at most %u bytes and ends with a newline; the connection is closed",
+                       IWN_LINE_MAX);
+        sock_clients_refuse(self, client, &request.id, &refusal);
+    }
     sock_service_finish(self, client);
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Any bytes as a client's line: a request in which every field is valid, or a refusal that can be printed; and the same
-// result as the earlier reader returns (old_reader.h), word for word.
+// result as the earlier reader returns (old_reader.h), word for word. A stop in a refused line is executed.
 #include "fuzz.h"
 
 #include "old_reader.h"
@@ -63,23 +63,72 @@ static void compare_requests(const iwn_request_t *now, const iwn_request_t *befo
                  "the same texts");
 }
 
-/// The earlier reader drops a NUL after a number or a word without a refusal: this one difference is intended.
+static size_t skip_blanks(const char *line, size_t size, size_t at) {
+    while (at < size && memchr(" \t\r", line[at], 3U) != NULL) {
+        at++;
+    }
+    return at;
+}
+
+static bool follows(const char *line, size_t size, size_t at, const char *words) {
+    return size - at >= strlen(words) && memcmp(&line[at], words, strlen(words)) == 0;
+}
+
+/// Returns the stop that a line names anywhere; 0: none. It knows no escapes.
+static iwn_cmd_t stop_in(const char *line, size_t size) {
+    static const char *const words[] = {"\"stop\"", "\"disarm\"", "\"estop\""};
+    iwn_cmd_t found = (iwn_cmd_t)0;
+    for (size_t i = 0; i < size; i++) {
+        const size_t colon = follows(line, size, i, "\"cmd\"") ? skip_blanks(line, size, i + 5U) : size;
+        const size_t value = follows(line, size, colon, ":") ? skip_blanks(line, size, colon + 1U) : size;
+        for (unsigned cmd = 0; cmd < 3U; cmd++) {
+            if (follows(line, size, value, words[cmd]) && IWN_CMD_STOP + cmd > found) {
+                found = (iwn_cmd_t)(IWN_CMD_STOP + cmd);
+            }
+        }
+    }
+    return found;
+}
+
+/// A line is refused: what names a stop is executed, nothing else.
+static void judge_stop(const char *line, size_t size, bool accepted, const iwn_request_t *now,
+                       const iwn_refusal_t *refusal) {
+    const iwn_cmd_t cmd = stop_in(line, size);
+    fuzz_require(accepted == iwn_cmd_stops(now->cmd), "a stop is executed");
+    fuzz_require(accepted == (now->refused == IWN_BAD_JSON), "and refused");
+    fuzz_require(accepted == (strstr(refusal->message, "; its stop is executed") != NULL), "and the client knows");
+    fuzz_require(now->cmd == cmd || memchr(line, '\\', size) != NULL, "the stop that the line names");
+    fuzz_require(cmd == 0 || now->cmd >= cmd, "or a stronger one, with escapes");
+}
+
+/// The earlier reader drops a NUL after a number or a word without a refusal, names a line that is nested too deeply in
+/// other words, and finds no stop in a refused line: these differences are intended.
 static void compare(const char *line, size_t size, bool accepted, const iwn_request_t *now,
                     const iwn_refusal_t *refusal) {
     static iwn_request_t before;
     static iwn_refusal_t refusal_before;
     const bool accepted_before = old_request_read(line, size, &before, &refusal_before);
     if (memchr(line, '\0', size) != NULL) {
-        fuzz_require(!accepted && refusal->error == IWN_BAD_JSON, "a NUL is bad JSON");
+        fuzz_require(now->refused == IWN_BAD_JSON || (!accepted && refusal->error == IWN_BAD_JSON),
+                     "a NUL is bad JSON");
+        judge_stop(line, size, accepted, now, refusal);
         return;
     }
-    fuzz_require(accepted == accepted_before, "both accept it, or neither");
+    fuzz_require((accepted && now->refused == IWN_OK) == accepted_before, "both accept it, or neither");
     compare_ids(&now->id, &before.id);
-    if (accepted) {
+    if (accepted_before) {
         compare_requests(now, &before);
+        return;
+    }
+    const size_t length = strlen(refusal_before.message);
+    fuzz_require(refusal->error == refusal_before.error, "refused with the same name");
+    fuzz_require(strncmp(refusal->message, refusal_before.message, length) == 0 ||
+                     strncmp(refusal_before.message, "nested more than ", 17U) == 0,
+                 "refused in the same words");
+    if (refusal->error == IWN_BAD_JSON) {
+        judge_stop(line, size, accepted, now, refusal);
     } else {
-        fuzz_require(refusal->error == refusal_before.error, "refused with the same name");
-        fuzz_require(strcmp(refusal->message, refusal_before.message) == 0, "refused in the same words");
+        fuzz_require(!accepted && refusal->message[length] == '\0', "refused without more words");
     }
 }
 

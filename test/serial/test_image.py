@@ -22,7 +22,7 @@ from judge import Judge
 from judge_log import Event, Frame, Violation, signed
 from rig import Cable, SerialRig
 from scenario import scenario
-from test_wires import all_closed, await_service, begin, cable_pulled, client_killed, relay_killed, relay_stopped, stop_well, tool  # noqa: F401
+from test_wires import all_closed, await_service, bad_stop, begin, cable_pulled, client_killed, relay_killed, relay_stopped, stop_well, tool  # noqa: F401
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 SLICE_US = 2000  # As in image.py.

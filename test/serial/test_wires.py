@@ -116,6 +116,25 @@ def tell_speed(t, rig, client):
     )
 
 
+@scenario("a stop in a line that is not valid JSON stops the wheels, and is refused", 8)
+def bad_stop(t):
+    rig, client = begin(t)
+    for line, verb in ((b'{"cmd":"stop","reason":"\\ud83d"}\n', "stop"), (b'{"id":1,"id":1,"cmd":"estop"}\n', "estop")):
+        t.drive_for(client, 250, 250, 0.6)
+        sent_us = now_us()
+        client.send_raw(line)
+        reply = client.read_reply(3.0)
+        rig.timeline.append(Event(sent_us, verb, now_us()))
+        t.check(reply and reply["error"] == "bad_json" and "its stop is executed" in reply["message"], f"{line}: {reply}")
+        state = client.request("status")["state"]
+        t.rule(state == ("latched" if verb == "estop" else "stopping"), f"{line}: {state}")
+        if verb == "estop":
+            t.reset(client)
+        t.silence(rig, client, 6)
+        t.arm(client)
+    stop_well(t, rig, client)
+
+
 @scenario("a client that is killed while it drives loses its lease immediately", 3)
 def client_killed(t):
     rig, client = begin_driving(t, 250, 250, 0.6)

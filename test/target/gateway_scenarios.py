@@ -105,6 +105,8 @@ def both_words_and_turns(rig):
     assert host.ask(1, {"cmd": "nonsense"})["error"] == "unknown_cmd"
     assert host.ask(1, {"cmd": "arm", "speed": 1})["error"] == "unknown_field"
     assert host.ask(1, {"cmd": "stop", "speed": 1})["ok"], "a stop was refused for a field"
+    host.say(1, b'{"cmd":"stop","reason":"\\ud83d"}')
+    host.wait(lambda line: line.message.get("error") == "bad_json" and "its stop is executed" in line.message["message"])
     assert host.ask(1, {"cmd": "recordings"})["error"] == "denied"
     host.ask(1, {"cmd": "watch", "topics": ["state"]})
     assert host.ask(1, {"cmd": "confirm", "item": "wheel_radius", "value": 194})["state"] == "confirmed"

@@ -14,6 +14,23 @@ TEST(test_host_arm_of_another_client_names_the_holder) {
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(answer, holder), answer);
 }
 
+TEST(test_stop_never_refused_by_a_board_in_a_bad_line) {
+    assert_answer("{\"cmd\":\"stop\",\"reason\":\"\\ud83d\"}", "\"ok\":false,\"error\":\"bad_json\"");
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(answer, "; its stop is executed"), answer);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, iw_gateway_state(&rig.gateway));
+    pass(2400);
+    arm();
+    assert_answer("{\"id\":1,\"id\":1,\"cmd\":\"estop\"}", "its stop is executed");
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, iw_gateway_state(&rig.gateway));
+    TEST_ASSERT_EQUAL_STRING("", host.server.estop_reason);
+}
+
+TEST(test_host_bad_line_without_a_stop_stops_nothing) {
+    assert_answer("{\"cmd\":\"stop,\"reason\":\"\\ud83d\"}", "\"ok\":false,\"error\":\"bad_json\"");
+    TEST_ASSERT_NULL_MESSAGE(strstr(answer, "stop is executed"), answer);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
+}
+
 TEST(test_host_that_restarts_refuses_arm_and_accepts_reset) {
     host.restart_us = 1;
     assert_answer("{\"cmd\":\"reset\",\"id\":1}", "\"id\":1");

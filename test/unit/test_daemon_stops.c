@@ -211,7 +211,7 @@ TEST(test_stop_place_for_anything_else_is_refused) {
                                          "{\"cmd\":\"watch\",\"topics\":[\"frame\"]}\n",
                                          "stop\n",
                                          "\n",
-                                         "{\"cmd\":\"stop\",}\n"};
+                                         "{\"cmd\":\"stop,}\n"};
     take_all_places();
     begin_driving();
     for (sock_right_t right = SOCK_DRIVE; right < SOCK_RIGHTS; right++) {
@@ -244,6 +244,94 @@ TEST(test_stop_after_another_line_is_executed) {
         (void)close(fd);
         come_to_rest();
     }
+}
+
+// Stops in lines that are refused ------------------------------------------------------------------------------------
+
+#define BAD_STOP  "{\"cmd\":\"stop\",\"reason\":\"\\ud83d\"}\n"
+#define BAD_ESTOP "{\"cmd\":\"estop\",\"id\":1,\"id\":1}\n"
+
+/// The line in `text` is the only reply: a refusal with this error.
+static void assert_refused_once(const char *error) {
+    const char *const reply = strstr(text, "\"ok\":false");
+    TEST_ASSERT_NOT_NULL_MESSAGE(reply, text);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, error), text);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, "its stop is executed"), text);
+    TEST_ASSERT_NULL_MESSAGE(strstr(reply + 1, "\"ok\":"), text);
+}
+
+TEST(test_stop_never_refused_in_a_bad_line_of_any_socket) {
+    for (sock_right_t right = SOCK_DRIVE; right < SOCK_RIGHTS; right++) {
+        const int fd = daemon_rig_knock(right);
+        begin_driving();
+        send_lines(fd, BAD_STOP);
+        assert_slower("a stop in bad JSON");
+        TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, daemon_rig_state());
+        (void)receive(fd);
+        assert_refused_once("\"error\":\"bad_json\"");
+        come_to_rest();
+        begin_driving();
+        send_lines(fd, BAD_ESTOP);
+        assert_slower("an estop in bad JSON");
+        TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
+        (void)receive(fd);
+        assert_refused_once("\"error\":\"bad_json\"");
+        (void)close(fd);
+        come_to_rest();
+    }
+}
+
+TEST(test_stop_never_refused_in_a_bad_line_without_a_place) {
+    take_all_places();
+    begin_driving();
+    const int fd = daemon_rig_knock(SOCK_WATCH);
+    send_lines(fd, BAD_ESTOP);
+    assert_slower("a stop place");
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
+    (void)receive(fd);
+    assert_refused_once("\"error\":\"bad_json\"");
+    TEST_ASSERT_TRUE(has_ended(fd));
+    (void)close(fd);
+    come_to_rest();
+}
+
+/// The connection ends as with any line that is too long.
+TEST(test_stop_never_refused_in_an_endless_line) {
+    static char line[2U * IWN_LINE_MAX];
+    static const char *const where[] = {"at the beginning", "at the end of the part that is read"};
+    const size_t begins[] = {0U, IWN_LINE_MAX + 1U - strlen("{\"cmd\":\"estop\"")};
+    for (size_t i = 0; i < 2U; i++) {
+        begin_driving();
+        const int fd = daemon_rig_knock(SOCK_DRIVE);
+        daemon_rig_run(2);
+        (void)receive(fd);
+        memset(line, ' ', sizeof line);
+        memcpy(&line[begins[i]], "{\"cmd\":\"estop\"", strlen("{\"cmd\":\"estop\""));
+        (void)send(fd, line, sizeof line, MSG_NOSIGNAL | MSG_DONTWAIT);
+        assert_slower(where[i]);
+        TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
+        (void)receive(fd);
+        assert_refused_once("\"error\":\"line_too_long\"");
+        TEST_ASSERT_TRUE(has_ended(fd));
+        (void)close(fd);
+        come_to_rest();
+    }
+}
+
+TEST(test_stop_absent_in_an_endless_line_stops_nothing) {
+    static char line[IWN_LINE_MAX + 1U];
+    begin_driving();
+    const int fd = daemon_rig_knock(SOCK_DRIVE);
+    memset(line, ' ', sizeof line);
+    memcpy(line, "{\"cmd\":\"why\"", strlen("{\"cmd\":\"why\""));
+    (void)send(fd, line, sizeof line, MSG_NOSIGNAL | MSG_DONTWAIT);
+    daemon_rig_drive(client, 300, 300, 100);
+    TEST_ASSERT_EQUAL_INT(300, daemon_rig.commanded_mm_s[IW_LEFT]);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(receive(fd), "\"error\":\"line_too_long\""), text);
+    TEST_ASSERT_NULL_MESSAGE(strstr(text, "stop is executed"), text);
+    TEST_ASSERT_TRUE(has_ended(fd));
+    (void)close(fd);
+    come_to_rest();
 }
 
 /// Sends more requests than the client reads; the stop follows the request whose reply has no more space.

@@ -128,14 +128,14 @@ TEST(test_request_not_one_object_is_bad_json) {
         "null",
         "17",
         "\"drive\"",
-        "[{\"cmd\":\"stop\"}]",
-        "{\"cmd\":\"stop\"}{\"cmd\":\"stop\"}",
-        "{\"cmd\":\"stop\"} x",
+        "[{\"cmd\":\"why\"}]",
+        "{\"cmd\":\"why\"}{\"cmd\":\"why\"}",
+        "{\"cmd\":\"why\"} x",
         "{cmd:\"stop\"}",
         "{'cmd':'stop'}",
-        "{\"cmd\":\"stop\",}",
-        "{\"cmd\":\"stop\"",
-        "{\"cmd\":\"stop\",\"cmd\":\"stop\"}",
+        "{\"cmd\":\"why\",}",
+        "{\"cmd\":\"why\"",
+        "{\"cmd\":\"why\",\"cmd\":\"why\"}",
         "{\"cmd\":\"drive\",\"left_mm_s\":1,\"left_mm_s\":2,\"right_mm_s\":1}",
         "{\"cmd\":\"drive\",\"left_mm_s\":1e999,\"right_mm_s\":1}",
         "{\"cmd\":\"drive\",\"left_mm_s\":NaN,\"right_mm_s\":1}",
@@ -150,7 +150,7 @@ TEST(test_request_not_one_object_is_bad_json) {
         "{\"cmd\":\"arm\",\"name\":\"\xF5\x80\x80\x80\"}",
         "{\"cmd\":\"arm\",\"name\":\"\xE2\x82\"}",
         "{\"cmd\":\"arm\",\"name\":\"\x01\"}",
-        "\xEF\xBB\xBF{\"cmd\":\"stop\"}",
+        "\xEF\xBB\xBF{\"cmd\":\"why\"}",
     };
     for (size_t i = 0; i < sizeof lines / sizeof lines[0]; i++) {
         refused(IWN_BAD_JSON, lines[i]);
@@ -158,12 +158,125 @@ TEST(test_request_not_one_object_is_bad_json) {
 }
 
 TEST(test_request_nul_byte_anywhere_is_bad_json) {
-    static const char line[] = "{\"cmd\":\"stop\"}\0";
+    static const char line[] = "{\"cmd\":\"why\"}\0";
     TEST_ASSERT_FALSE(iwn_request_read(line, sizeof line - 1U, &work, &request, &refusal));
     TEST_ASSERT_EQUAL_INT(IWN_BAD_JSON, refusal.error);
     static const char inside[] = "{\"cmd\":\"st\0op\"}";
     TEST_ASSERT_FALSE(iwn_request_read(inside, sizeof inside - 1U, &work, &request, &refusal));
     TEST_ASSERT_EQUAL_INT(IWN_BAD_JSON, refusal.error);
+}
+
+// Stops in lines that are refused ------------------------------------------------------------------------------------
+
+/// The line is refused as bad JSON, and this stop in it is executed.
+static void assert_executed(iwn_cmd_t cmd, const char *line, size_t length) {
+    TEST_ASSERT_TRUE_MESSAGE(iwn_request_read(line, length, &work, &request, &refusal), line);
+    TEST_ASSERT_EQUAL_INT_MESSAGE(cmd, request.cmd, line);
+    TEST_ASSERT_EQUAL_INT_MESSAGE(IWN_BAD_JSON, request.refused, line);
+    TEST_ASSERT_EQUAL_INT(IWN_BAD_JSON, refusal.error);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(refusal.message, "; its stop is executed"), refusal.message);
+    TEST_ASSERT_EQUAL_INT(IWN_ID_NONE, request.id.kind);
+    TEST_ASSERT_FALSE(request.has_t_us || request.has_stop);
+    TEST_ASSERT_EQUAL_STRING("", request.reason);
+}
+
+TEST(test_stop_never_refused_in_a_bad_line) {
+    static const char *const lines[] = {
+        "{\"cmd\":\"%s\",\"reason\":\"\\ud83d\"}",
+        "{\"reason\":\"\\ud83d\",\"cmd\":\"%s\"}",
+        "{\"reason\":\"a\\u0000b\",\"id\":7,\"cmd\":\"%s\"}",
+        "{\"reason\":\"\xC3\x28\",\"cmd\":\"%s\"}",
+        "{\"reason\":\"a\"b\",\"cmd\":\"%s\"}",
+        "{\"reason\":\"a\\x\",\"cmd\":\"%s\"}",
+        "{\"cmd\":\"%s\",\"reason\":\"a\tb\"}",
+        "{\"cmd\":\"%s\",\"id\":1,\"id\":1}",
+        "{\"cmd\":\"%s\",\"t_us\":1e999}",
+        "{\"cmd\":\"%s\",\"t_us\":9223372036854775808}",
+        "{\"cmd\":\"%s\",\"t_us\":NaN,}",
+        "{\"cmd\":\"%s\",\"a\":[[[[[[[[1]]]]]]]]}",
+        "{\"cmd\":\"%s\",\"reason\":\"never end",
+        "{\"cmd\":\"%s\"",
+        "{\"cmd\" \t: \t\"%s\",",
+        "  \"cmd\": \"%s\",",
+        "[{\"cmd\":\"%s\"}]",
+        "\xEF\xBB\xBF{\"cmd\":\"%s\"}",
+        "{\"cmd\":\"drive\",\"cmd\":\"%s\"}",
+        "{\"cmd\":\"%s\",\"cmd\":\"arm\"}",
+        "\"cmd\"\"cmd\":\"%s\"",
+    };
+    static const iwn_cmd_t cmds[] = {IWN_CMD_STOP, IWN_CMD_DISARM, IWN_CMD_ESTOP};
+    static const char *const names[] = {"stop", "disarm", "estop"};
+    char line[128];
+    for (size_t i = 0; i < sizeof lines / sizeof lines[0]; i++) {
+        for (size_t cmd = 0; cmd < 3U; cmd++) {
+            (void)snprintf(line, sizeof line, lines[i], names[cmd]);
+            assert_executed(cmds[cmd], line, strlen(line));
+        }
+    }
+    static const char nul[] = "{\"cmd\":\"stop\"}\0";
+    assert_executed(IWN_CMD_STOP, nul, sizeof nul - 1U);
+    static const char behind[] = "\0{\"cmd\":\"stop\"}";
+    assert_executed(IWN_CMD_STOP, behind, sizeof behind - 1U);
+}
+
+TEST(test_stop_never_replaces_an_estop_in_a_bad_line) {
+    static const char both[] = "{\"cmd\":\"estop\"}{\"cmd\":\"stop\"}";
+    assert_executed(IWN_CMD_ESTOP, both, sizeof both - 1U);
+    static const char behind[] = "{\"cmd\":\"disarm\"}{\"cmd\":\"estop\"}";
+    assert_executed(IWN_CMD_ESTOP, behind, sizeof behind - 1U);
+}
+
+TEST(test_request_bad_line_without_a_stop_stops_nothing) {
+    static const char *const lines[] = {
+        "{\"cmd\":\"stop",
+        "{\"cmd\":\"stop,\"a\":1",
+        "{\"cmd\":stop}",
+        "{\"cmd\":\"stops\",}",
+        "{\"cmd\":\"sto\",}",
+        "{\"cmd\":\"Stop\",}",
+        "{\"cmd\":\"\",}",
+        "{\"cmd\",\"stop\"}",
+        "{\"cmd\"\"stop\"}",
+        "{\"cmds\":\"stop\",}",
+        "{\"acmd\":\"stop\",}",
+        "{\"a\":\"stop\",}",
+        "{\"cmd\":[\"stop\"],}",
+        "{\"cmd\":\"why\",\"a\":\"stop\",}",
+        "{\"reason\":\"{\\\"cmd\\\":\\\"stop\\\"}\",}",
+        "\"cmd\"",
+        "\"cmd\":",
+        "stop",
+    };
+    for (size_t i = 0; i < sizeof lines / sizeof lines[0]; i++) {
+        refused(IWN_BAD_JSON, lines[i]);
+        TEST_ASSERT_NULL_MESSAGE(strstr(refusal.message, "stop is executed"), lines[i]);
+        TEST_ASSERT_FALSE_MESSAGE(iwn_cmd_stops(request.cmd), lines[i]);
+    }
+    refused(IWN_UNKNOWN_FIELD, "{\"cmd\":\"why\",\"a\":{\"cmd\":\"stop\"}}"); // Valid JSON is not searched.
+    refused(IWN_MISSING_FIELD, "{\"a\":{\"cmd\":\"stop\"}}");
+    accepted("{\"cmd\":\"stop\",\"a\":{\"cmd\":\"estop\"}}", IWN_CMD_STOP);
+    TEST_ASSERT_EQUAL_INT(IWN_OK, request.refused);
+}
+
+/// The bytes behind the line are not part of it.
+TEST(test_request_stop_behind_the_end_of_the_line_stops_nothing) {
+    static const char line[] = "{\"cmd\":\"stop\",}";
+    for (size_t length = 0; length < 13U; length++) {
+        TEST_ASSERT_FALSE(iwn_request_read(line, length, &work, &request, &refusal));
+    }
+    assert_executed(IWN_CMD_STOP, line, 13U);
+}
+
+TEST(test_stop_never_refused_in_a_line_that_is_too_long) {
+    char line[IWN_LINE_MAX + 1U];
+    memset(line, ' ', sizeof line);
+    memcpy(&line[sizeof line - 14U], "{\"cmd\":\"stop\"", 14);
+    TEST_ASSERT_TRUE(iwn_request_read(line, sizeof line, NULL, &request, &refusal));
+    TEST_ASSERT_EQUAL_INT(IWN_CMD_STOP, request.cmd);
+    TEST_ASSERT_EQUAL_INT(IWN_LINE_TOO_LONG, request.refused);
+    TEST_ASSERT_EQUAL_INT(IWN_LINE_TOO_LONG, refusal.error);
+    TEST_ASSERT_EQUAL_STRING("a request has at most 4096 bytes; end each with a newline; its stop is executed",
+                             refusal.message);
 }
 
 TEST(test_request_nesting_beyond_the_limit_is_bad_json) {
@@ -172,7 +285,7 @@ TEST(test_request_nesting_beyond_the_limit_is_bad_json) {
     memset(&line[length], '[', 3000);
     TEST_ASSERT_FALSE(iwn_request_read(line, length + 3000U, &work, &request, &refusal));
     TEST_ASSERT_EQUAL_INT(IWN_BAD_JSON, refusal.error);
-    TEST_ASSERT_NOT_NULL(strstr(refusal.message, "nested"));
+    TEST_ASSERT_NOT_NULL(strstr(refusal.message, "nested more than 8 deep"));
     refused(IWN_BAD_VALUE, "{\"cmd\":\"arm\",\"name\":[[[[[[[]]]]]]]}");
     refused(IWN_BAD_JSON, "{\"cmd\":\"arm\",\"name\":[[[[[[[[]]]]]]]]}");
     accepted("{\"cmd\":\"arm\",\"name\":\"\\\"[[[[[[[[[[[[{{{{{{\"}", IWN_CMD_ARM);

@@ -180,6 +180,140 @@ TEST(test_relay_stop_beyond_the_places_passes_questions) {
     TEST_ASSERT_EQUAL_STRING("{\"id\":9,\"ok\":true,\"state\":\"stopping\"}\n", guest_got);
 }
 
+// Stops in lines that are refused ------------------------------------------------------------------------------------
+
+#define BAD_ESTOP "{\"cmd\":\"estop\",\"id\":9,\"reason\":\"\\ud83d\"}\n"
+#define BAD_JSON                                                                                                       \
+    "{\"id\":null,\"ok\":false,\"error\":\"bad_json\",\"message\":\"not one JSON object on one line; its stop is "     \
+    "executed\"}\n"
+
+static unsigned answered_at;
+
+/// The board answers the stop at step `answered_at`.
+static bool refused_line(void) {
+    begin_with_a_client();
+    if (step == 30U) {
+        client_writes(BAD_ESTOP STATUS("2"));
+    }
+    if (step == 32U) {
+        TEST_ASSERT_EQUAL_UINT_MESSAGE(1, written("\"cmd\":\"estop\"}"), to_board);
+        client_receives();
+        TEST_ASSERT_NULL_MESSAGE(strstr(received, "bad_json"), received);
+    }
+    if (step == answered_at) {
+        board_answers(1, "\"estop\"", "true,\"state\":\"latched\"");
+    }
+    return step == 100U;
+}
+
+TEST(test_stop_never_refused_by_a_relay_in_a_bad_line) {
+    answered_at = 33U;
+    run(refused_line);
+    client_receives();
+    TEST_ASSERT_EQUAL_STRING(BAD_JSON, received);
+}
+
+/// The refusal reports that the stop is executed, so it waits for the answer of the board.
+TEST(test_relay_stop_in_a_bad_line_is_confirmed_by_the_board) {
+    answered_at = 1000U;
+    run(refused_line);
+    client_receives();
+    TEST_ASSERT_EQUAL_STRING("", received);
+}
+
+/// The board receives equal stops that wait together as one.
+static bool equal_stops(void) {
+    begin_with_a_client();
+    if (step == 30U) {
+        client_writes("{\"cmd\":\"estop\",\"id\":1}\n" BAD_ESTOP "{\"cmd\":\"estop\",\"id\":3}\n");
+    }
+    if (step == 33U) {
+        board_answers(1, "\"estop\"", "true");
+    }
+    return step == 100U;
+}
+
+TEST(test_relay_refuses_only_the_bad_line_of_equal_stops) {
+    run(equal_stops);
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(1, written("\"cmd\":\"estop\"}"), to_board);
+    client_receives();
+    TEST_ASSERT_EQUAL_STRING("{\"event\":\"hello\"}\n{\"id\":1,\"ok\":true}\n" BAD_JSON "{\"id\":3,\"ok\":true}\n",
+                             received);
+}
+
+static bool questions_then_refused_line(void) {
+    begin_with_a_client();
+    if (step == 30U) {
+        client_writes(FOUR "{\"cmd\":\"arm\",\"id\":5}\n" BAD_ESTOP);
+    }
+    if (step == 33U) {
+        board_answers(1, "\"estop\"", "true,\"state\":\"latched\"");
+    }
+    if (step >= 60U && step % 10U == 0U && step <= 90U) {
+        board_answers(1, "\"status\"", "true");
+    }
+    return step == 200U;
+}
+
+TEST(test_stop_never_waits_for_questions_in_a_bad_line) {
+    run(questions_then_refused_line);
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(1, written("\"cmd\":\"estop\"}"), to_board);
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(0, written("\"arm\""), to_board);
+    client_receives();
+    const char *const fifth = strstr(received, "{\"id\":5,\"ok\":false");
+    TEST_ASSERT_NOT_NULL_MESSAGE(fifth, received);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(fifth, BAD_JSON), received);
+}
+
+static bool questions_then_bad_guest(void) {
+    begin_with_a_client();
+    if (step == 30U) {
+        client_writes(FOUR);
+    }
+    if (step == 50U) {
+        guest_sends(BAD_ESTOP);
+    }
+    if (step == 52U) {
+        board_answers(1, "\"estop\"", "true,\"state\":\"latched\"");
+    }
+    if (step == 60U) {
+        guest_reads();
+    }
+    return step == 100U;
+}
+
+TEST(test_stop_never_needs_a_place_of_the_relay_in_a_bad_line) {
+    settings.northbound.max_clients = 1;
+    run(questions_then_bad_guest);
+    TEST_ASSERT_TRUE(guest_is_closed);
+    TEST_ASSERT_EQUAL_STRING(BAD_JSON, guest_got);
+}
+
+static bool long_line(void) {
+    static char line[IWN_LINE_MAX + 2U];
+    begin_with_a_client();
+    if (step == 30U) {
+        memset(line, ' ', IWN_LINE_MAX + 1U);
+        memcpy(line, "{\"cmd\":\"stop\"", strlen("{\"cmd\":\"stop\""));
+        client_writes(line);
+    }
+    if (step == 33U) {
+        board_answers(1, "\"stop\"", "true");
+    }
+    return step == 100U;
+}
+
+TEST(test_stop_never_refused_by_a_relay_in_an_endless_line) {
+    char byte;
+    run(long_line);
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(1, written("\"cmd\":\"stop\"}"), to_board);
+    client_receives();
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(received, "\"error\":\"line_too_long\""), received);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(received, "its stop is executed"), received);
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(1, count_in(received, "\"ok\":"), received);
+    TEST_ASSERT_EQUAL_INT(0, recv(client_fd, &byte, 1U, MSG_DONTWAIT));
+}
+
 /// The board has not welcomed the sender yet, but another client.
 static bool stop_before_the_welcome(void) {
     begin_with_a_client();

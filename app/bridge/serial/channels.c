@@ -197,6 +197,10 @@ sock_handler_t relay_handler(relay_t *self) {
 
 void relay_pass_reply(relay_t *self, sock_client_t *client, const serial_request_t *request, const char *rest,
                       size_t length) {
+    if (request->ok && request->error != IWN_OK) {
+        relay_refuse(self, client, &request->id, request->error, request->reason);
+        return;
+    }
     iwn_out_t json = iwn_write_reply(self->clients.line, sizeof self->clients.line, &request->id, request->ok);
     if (length + 1U < json.size - json.length) {
         memcpy(&json.data[json.length], rest, length);

@@ -136,7 +136,8 @@ relay_channel_t *relay_channel_of(relay_t *self, const sock_client_t *client);
 
 void relay_refuse(relay_t *self, sock_client_t *client, const iwn_id_t *id, iwn_error_t error, const char *reason);
 
-/// Passes a reply: `rest` is the part after `ok` in the board's reply, and the client receives it with its own id.
+/// Passes a reply: `rest` is the part after `ok` in the board's reply, and the client receives it with its own id. If
+/// the board executed a stop whose line is refused, the client receives the refusal.
 void relay_pass_reply(relay_t *self, sock_client_t *client, const serial_request_t *request, const char *rest,
                       size_t length);
 
@@ -161,7 +162,8 @@ size_t relay_write_numbered(iwn_json_t root, uint64_t number, char *out, size_t 
 /// Sends a stop, which may have been sent ahead, and queues its reply.
 void relay_stop_forward(relay_t *self, relay_channel_t *channel, sock_client_t *client, const iwn_request_t *asked);
 
-/// Executes a stop of a client that has no queue, because it is beyond the maximum or is being closed.
+/// Executes a stop of a client that has no queue, because it is beyond the maximum or is being closed. A client that is
+/// being closed receives the refusal of its line here.
 void relay_stop_last(relay_t *self, sock_client_t *client, const iwn_request_t *asked);
 
 /// Sends the stops among the lines whose turn has not come. Their replies stay in order.

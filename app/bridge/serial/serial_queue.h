@@ -54,7 +54,7 @@ typedef struct {
     uint64_t sent_us;   ///< Time of the first transmission.
     uint64_t tried_us;  ///< Time of the last transmission.
     iwn_id_t id;        ///< Id of the client.
-    iwn_error_t error;  ///< ANSWERED: the error, ...
+    iwn_error_t error;  ///< ANSWERED, and a stop whose line is refused: the error, ...
     const char *reason; ///< ... and its text.
     bool ok;            ///< HELD: whether the board accepted it. The rest of the answer is in `json`.
     size_t length;      ///< Length of `json`.

@@ -5,6 +5,10 @@
 
 #include "iwheel_northbound/json_out.h"
 
+#define BAD_JSON      "not one JSON object on one line; its stop is executed"
+#define LINE_TOO_LONG "a request has at most 4096 bytes and ends with a newline; its stop is executed"
+IW_STATIC_ASSERT(IWN_LINE_MAX == 4096U, the_message_has_this_number);
+
 size_t relay_write_numbered(iwn_json_t root, uint64_t number, char *out, size_t size) {
     iwn_text_t text = iwn_text_begin(out, size);
     iwn_json_t rest = iwn_json_inside(root);
@@ -38,6 +42,16 @@ static void write_stop(relay_stop_t *stop, const iwn_request_t *asked) {
     }
     iwn_out_close(&out, '}');
     request->length = iwn_out_finish(&out) - 1U; // Without its newline.
+}
+
+static const char *reason_of(const iwn_request_t *asked) {
+    return (asked->refused == IWN_LINE_TOO_LONG) ? LINE_TOO_LONG : BAD_JSON;
+}
+
+/// Sets the refusal that replaces the reply of the board if the line of the stop is refused.
+static void refuse_line(serial_request_t *request, const iwn_request_t *asked) {
+    request->error = asked->refused;
+    request->reason = reason_of(asked);
 }
 
 /// Returns a stop with the same effect that is not sent yet, or NULL. IW_CLIENT_NONE: of any client.
@@ -104,6 +118,7 @@ static relay_stop_t *put(relay_t *self, sock_client_t *client, const iwn_request
     stop->ahead = false;
     stop->request =
         (serial_request_t){.kind = SERIAL_STOPS, .number = ++self->number, .id = asked->id, .came_us = self->now_us};
+    refuse_line(&stop->request, asked);
     write_stop(stop, asked);
     client->owed = client->owed || channel == NULL; // It waits for the reply; that of a channel waits for its queue.
     return stop;
@@ -133,6 +148,7 @@ void relay_stop_forward(relay_t *self, relay_channel_t *channel, sock_client_t *
     serial_request_t *place = serial_queue_place(&channel->queue);
     *place = stop->request;
     place->id = asked->id;
+    refuse_line(place, asked);
     if (place->state == SERIAL_HELD) {
         stop->request.number = 0;
     } else {
@@ -146,10 +162,15 @@ void relay_stop_last(relay_t *self, sock_client_t *client, const iwn_request_t *
     relay_stop_t *stop = stop_ahead(self, client, asked->cmd);
     if (self->link.state == SERIAL_SILENT) {
         relay_refuse(self, client, &asked->id, IWN_BUS_DOWN, RELAY_NOT_SENT);
-    } else if (stop != NULL) {
+        return;
+    }
+    if (stop != NULL) {
         stop->ahead = false; // Without an answer it continues; HELD: it is done.
     } else {
         (void)put(self, client, asked);
+    }
+    if (asked->refused != IWN_OK && relay_channel_of(self, client) != NULL) {
+        relay_refuse(self, client, &asked->id, asked->refused, reason_of(asked));
     }
 }
 

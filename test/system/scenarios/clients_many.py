@@ -301,6 +301,47 @@ def row33_stop_never_refused(t):
     t.judge(rig, estop_limit_us=STOP_MS * 1000)  # Includes the wait for a place of the socket.
 
 
+BAD_STOPS = [
+    (b'{"cmd":"stop","reason":"\\ud83d"}\n', "bad_json"),
+    (b'{"reason":"a\\u0000b","cmd":"disarm"}\n', "bad_json"),
+    (b'{"id":1,"id":1,"cmd":"estop"}\n', "bad_json"),
+    (b'{"cmd" : "stop","t_us":1e999}\n', "bad_json"),
+    (b'{"cmd":"stop","reason":' + b"[" * 9 + b"]" * 9 + b"}\n", "bad_json"),
+    (b'{"cmd":"estop","reason":"cut\n', "bad_json"),
+    (b'{"cmd":"stop","reason":"' + b"x" * 5000, "line_too_long"),
+]
+
+
+@scenario("a stop in a line that is refused as a whole, on both sockets: carried out within 60 ms, and refused", 30)
+def row33_stop_in_a_bad_line(t):
+    rig = t.rig()
+    rig.configure(northbound={"watch_socket": rig.path("watch.sock"), "watch_group": "none"})
+    owner = rig.connect_to_new(name="owner")
+    observer = rig.client("observer")
+    worst = 0
+    for number, (line, error) in enumerate(BAD_STOPS):
+        verb = "estop" if b"estop" in line else "stop"
+        stream = t.start_driving(owner, 300, 300, 0.6)
+        sock = connect(rig.path("watch.sock" if number % 2 else "gateway.sock"))
+        read_some(sock, 1)  # The greeting
+        sent_us = now_us()
+        sock.sendall(line)
+        reply = read_some(sock, 1)
+        rig.timeline.append(Event(sent_us, verb, now_us()))
+        time.sleep(0.2)  # Until the bus log contains the reaction.
+        worst = max(worst, t.first_after(rig, sent_us, lambda mm_s: mm_s < 300, f"{line[:40]!r}", STOP_MS) or 0)
+        t.check(f'"error":"{error}"'.encode() in reply and b"its stop is executed" in reply, f"{line[:40]!r}: {reply[:300]!r}")
+        state = observer.request("status")["state"]  # The stream uses the owner.
+        t.rule(state == ("latched" if verb == "estop" else "stopping"), f"{line[:40]!r}: {state}")
+        sock.close()
+        stream.stop()
+        if verb == "estop":
+            time.sleep(1.2)
+            t.reset(owner)
+    t.figure(f"slower after {worst:.1f} ms at most")
+    t.judge(rig, estop_limit_us=STOP_MS * 1000)
+
+
 def _has_left(sock):
     """The gateway has closed it."""
     try:

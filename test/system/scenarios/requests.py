@@ -47,7 +47,7 @@ def row08_endless_lines(t):
     client.send_raw(exact.replace(b"6 ", b"6  ", 1))
     reply = client.read_reply()
     t.check(reply and reply.get("error") == "line_too_long", f"4097 are not: {reply}")
-    half = rig.client()
+    half = rig.client()  # A stop in a bad line is executed, but this is no line.
     half.send_raw(b'{"cmd":"estop"}')
     half.close()
     time.sleep(0.1)

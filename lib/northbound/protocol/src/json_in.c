@@ -110,7 +110,7 @@ static void close_container(check_t *self) {
 /// it is empty, after closing it.
 static bool open_container(check_t *self, int *token) {
     if (self->depth == IWN_DEPTH_MAX) {
-        return fail(self, "nested too deeply");
+        return fail(self, "nested more than 8 deep");
     }
     self->is_list[self->depth] = *token == '[';
     self->first[self->depth] = self->names;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "iwheel_northbound/request.h"
 
+#include "json_scan.h"
+
 #include <string.h>
 
 typedef enum { INTEGER, RATE, TEXT, FLAG, TOPICS, SIDE, ITEM, VALUE } field_kind_t;
@@ -36,6 +38,7 @@ enum { IWN_REQUEST_FIELDS(INDEX) FIELDS };
 
 static const char *const cmd_names[] = {IWN_REQUEST_NAMES(NAME)};
 IW_STATIC_ASSERT(true IWN_REQUEST_FIELDS(HAS_ROOM), room_for_each_text_and_its_terminator);
+IW_STATIC_ASSERT(IWN_DEPTH_MAX == 8U, a_message_of_iwn_json_check_has_this_number);
 IW_STATIC_ASSERT(IWN_CMDS <= 24 && FIELDS <= 32, a_bit_for_each_command_and_each_field);
 
 #define NOT_PLAIN                                                                                                      \
@@ -94,24 +97,6 @@ static unsigned find_word(iwn_json_t value, const char *(*word)(unsigned)) {
         i++;
     }
     return i;
-}
-
-/// Counts the brackets of the line, whatever else is wrong with it. Brackets in texts do not count.
-static bool is_too_deep(const char *line, size_t length) {
-    unsigned depth = 0;
-    bool in_text = false;
-    for (size_t i = 0; i < length && depth <= IWN_DEPTH_MAX; i++) {
-        const char c = line[i];
-        if (in_text) {
-            in_text = c != '"';
-            i += (c == '\\') ? 1U : 0U;
-        } else {
-            in_text = c == '"';
-            depth += (c == '{' || c == '[') ? 1U : 0U;
-            depth -= ((c == '}' || c == ']') && depth > 0U) ? 1U : 0U;
-        }
-    }
-    return depth > IWN_DEPTH_MAX;
 }
 
 static bool read_text(const field_t *field, iwn_json_t value, char *target, iwn_refusal_t *out_refusal) {
@@ -334,32 +319,67 @@ static bool is_complete(uint32_t seen, iwn_request_t *request, iwn_refusal_t *ou
 }
 
 /// Checks that the line is one valid object.
-static bool read_line(const char *line, size_t length, iwn_work_t *work, iwn_refusal_t *out_refusal) {
+static bool read_line(const char *line, size_t length, iwn_work_t *work, iwn_text_t *message) {
     iwn_json_t root;
-    char digits[NUMBER_SIZE];
-    iwn_text_t message = iwn_text_begin(out_refusal->message, sizeof out_refusal->message);
-    out_refusal->error = IWN_BAD_JSON;
-    iwn_text_add(&message, "not one JSON object on one line: ");
-    if (iwn_json_check(line, length, work, &root, &message)) {
-        iwn_text_add(&message, "it is not an object");
+    iwn_text_add(message, "not one JSON object on one line: ");
+    if (iwn_json_check(line, length, work, &root, message)) {
+        iwn_text_add(message, "it is not an object");
         return iwn_json_kind(root) == IWN_JSON_OBJECT;
     }
-    return is_too_deep(line, length)
-               ? IWN_REFUSE(out_refusal, IWN_BAD_JSON, "nested more than ", number(IWN_DEPTH_MAX, digits), " deep")
-               : false;
+    return false;
+}
+
+/// Finds a stop in a refused line. The scanner reads from one `"cmd"` to the next one at most, so the cost grows with
+/// the length.
+static bool find_stop(const char *line, size_t length, iwn_request_t *out_request, iwn_text_t *message) {
+    static const char name[] = "\"cmd\"";
+    iwn_scan_t scan = {.end = line + length, .failed = true};
+    for (; length >= sizeof name - 1U; length--, line++) {
+        scan.at = line + sizeof name - 1U;
+        if (memcmp(line, name, sizeof name - 1U) == 0 && iwn_scan(&scan) == ':' && iwn_scan(&scan) == IWN_TOKEN_TEXT) {
+            const iwn_cmd_t cmd = (iwn_cmd_t)find_word((iwn_json_t){scan.token}, cmd_word);
+            if (iwn_cmd_stops(cmd) && cmd > out_request->cmd) {
+                out_request->cmd = cmd;
+                out_request->refused = IWN_BAD_JSON;
+            }
+        }
+    }
+    if (out_request->refused == IWN_OK) {
+        return false;
+    }
+    iwn_text_add(message, "; its stop is executed");
+    return true;
+}
+
+bool iwn_request_read_short(const char *line, size_t length, iwn_work_t *work, iwn_request_t *out_request,
+                            iwn_refusal_t *out_refusal) {
+    const iwn_request_t request = {.rate_hz = IWN_RATE_DEFAULT_HZ, .sides = IW_SIDES_BOTH};
+    members_t members = {.line = line, .work = work};
+    uint32_t seen = 0;
+    iwn_text_t message = iwn_text_begin(out_refusal->message, sizeof out_refusal->message);
+    *out_request = request;
+    out_refusal->error = IWN_BAD_JSON;
+    if (!read_line(line, length, work, &message)) {
+        return find_stop(line, length, out_request, &message);
+    }
+    return read_common(&members, out_request, out_refusal) && read_fields(&members, out_request, &seen, out_refusal) &&
+           is_complete(seen, out_request, out_refusal);
 }
 
 bool iwn_request_read(const char *line, size_t length, iwn_work_t *work, iwn_request_t *out_request,
                       iwn_refusal_t *out_refusal) {
-    const iwn_request_t request = {.rate_hz = IWN_RATE_DEFAULT_HZ, .sides = IW_SIDES_BOTH};
-    char digits[NUMBER_SIZE];
-    members_t members = {.line = line, .work = work};
-    uint32_t seen = 0;
-    *out_request = request;
-    if (length > IWN_LINE_MAX) {
-        return IWN_REFUSE(out_refusal, IWN_LINE_TOO_LONG, "a request has at most ", number(IWN_LINE_MAX, digits),
-                          " bytes; end each with a newline");
+    if (length <= IWN_LINE_MAX) {
+        return iwn_request_read_short(line, length, work, out_request, out_refusal);
     }
-    return read_line(line, length, work, out_refusal) && read_common(&members, out_request, out_refusal) &&
-           read_fields(&members, out_request, &seen, out_refusal) && is_complete(seen, out_request, out_refusal);
+    iwn_text_t message = iwn_text_begin(out_refusal->message, sizeof out_refusal->message);
+    *out_request = (iwn_request_t){.cmd = IWN_CMD_HELLO};
+    out_refusal->error = IWN_LINE_TOO_LONG;
+    iwn_text_add(&message, "a request has at most ");
+    iwn_text_int(&message, IWN_LINE_MAX);
+    iwn_text_add(&message, " bytes; end each with a newline");
+    if (!find_stop(line, length, out_request, &message)) {
+        return false;
+    }
+    out_request->refused = IWN_LINE_TOO_LONG;
+    return true;
 }

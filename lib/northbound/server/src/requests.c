@@ -23,7 +23,12 @@ void iwn_server_refuse_as(iwn_server_t *self, iwn_client_t *client, iw_refusal_t
     iwn_server_refuse(self, client, &self->request.id);
 }
 
+/// Answers a stop whose line is refused with that refusal.
 static void reply_state(iwn_server_t *self, iwn_client_t *client) {
+    if (self->request.refused != IWN_OK) {
+        iwn_server_refuse(self, client, &self->request.id);
+        return;
+    }
     iwn_out_t json = iwn_server_begin_reply(self, &self->request.id);
     iwn_out_text(&json, "state", iwn_state_name(iw_gateway_state(self->core)));
     iwn_server_send_reply(self, client, &json);

@@ -55,6 +55,7 @@ typedef struct {
 typedef struct {
     iwn_id_t id;                            ///< Id for the reply.
     iwn_cmd_t cmd;                          ///< Command, which determines the valid fields.
+    iwn_error_t refused;                    ///< IWN_OK; otherwise the line is refused, but its stop is executed.
     int64_t left_mm_s;                      ///< drive.
     int64_t right_mm_s;                     ///< drive.
     int64_t left_mA;                        ///< drive, with `has_current`.
@@ -96,14 +97,23 @@ bool iwn_refuse(iwn_refusal_t *out_refusal, iwn_error_t error, const char *const
 /// Does the same with the texts as arguments.
 #define IWN_REFUSE(out_refusal, error, ...) iwn_refuse((out_refusal), (error), (const char *const[]){__VA_ARGS__, NULL})
 
-/// Reads `length` bytes without newline. Returns true if `*out_request` is complete. Returns false and writes
+/// Reads `length` bytes without newline. Returns true if `*out_request` is to be executed. Returns false and writes
 /// `*out_refusal` otherwise; `out_request->id` then has the id if it could be read. Errors are reported in this order:
 /// the line as a whole, the id, the command, its fields in their order, missing fields.
 ///
 /// An object that names a stop (`iwn_cmd_stops`) is always accepted. Its unknown fields and an invalid id are ignored. A
 /// reason that is too long is cut, and in an invalid one each byte of a character that is not allowed becomes a space.
+///
+/// A line that is not one valid JSON object, or is too long, is searched for `"cmd"`, a colon and the name of a stop, at
+/// any place and depth; an estop has priority. If there is one, the function returns true with this `cmd`, with the
+/// error in `out_request->refused`, and without other fields. It also writes `*out_refusal`: the caller executes the
+/// stop, and replies with the refusal. `"cmd"` without escapes is found, its value also with escapes.
 bool iwn_request_read(const char *line, size_t length, iwn_work_t *work, iwn_request_t *out_request,
                       iwn_refusal_t *out_refusal);
+
+/// Does the same for a line of which the caller knows that it has at most IWN_LINE_MAX bytes.
+bool iwn_request_read_short(const char *line, size_t length, iwn_work_t *work, iwn_request_t *out_request,
+                            iwn_refusal_t *out_refusal);
 
 #ifdef __cplusplus
 }
