@@ -68,6 +68,16 @@ static void judge_again(mqtt_judge_t *judge, const mqtt_rules_t *rules, const mq
     fuzz_require(order.verb == MQTT_HELLO || order.verdict == MQTT_LATE, "not late");
 }
 
+/// Returns true if the payload is no JSON object.
+static bool is_garbled(const mqtt_command_t *command) {
+    static iwn_work_t work;
+    char why[80];
+    iwn_text_t fault = iwn_text_begin(why, sizeof why);
+    iwn_json_t root;
+    return !iwn_json_check(command->payload, command->length, &work, &root, &fault) ||
+           iwn_json_kind(root) != IWN_JSON_OBJECT;
+}
+
 static void judge_command(const mqtt_rules_t *rules, const mqtt_command_t *command, bool crowded) {
     mqtt_judge_t judge = {0};
     mqtt_order_t order;
@@ -77,7 +87,12 @@ static void judge_command(const mqtt_rules_t *rules, const mqtt_command_t *comma
     }
     mqtt_judge(&judge, rules, command, NOW_US, &order);
     fuzz_require(judge.counts[order.verdict] == 1U, "counted");
-    fuzz_require((order.verdict == MQTT_TAKEN) == (order.request[0] != '\0'), "a request, or a reason");
+    const bool anyway = order.verdict == MQTT_GARBLED && order.request[0] != '\0';
+    fuzz_require((order.verdict == MQTT_TAKEN || anyway) == (order.request[0] != '\0'), "a request, or a reason");
+    fuzz_require(!anyway || (is_stop(order.verb) && !command->retained && is_garbled(command)), "a garbled stop");
+    fuzz_require(
+        !anyway || strcmp(order.request, (order.verb == MQTT_STOP) ? "{\"cmd\":\"stop\"}" : "{\"cmd\":\"estop\"}") == 0,
+        "the stop alone");
     fuzz_position((order.verdict == MQTT_TAKEN) ? "accepted" : "refused");
     if (order.verdict != MQTT_TAKEN) {
         fuzz_require(order.why[0] != '\0', "and why");

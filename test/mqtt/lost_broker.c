@@ -117,6 +117,27 @@ static void test_sender_that_has_not_armed_drives_nothing(void) {
     TEST_ASSERT_EQUAL_INT16(100, daemon_rig.commanded_mm_s[IW_LEFT]);
 }
 
+/// The bridge cannot read its age.
+static void test_stop_never_needs_json_while_a_sender_drives(void) {
+    const mqtt_labels_t labels = {.expiry_s = 0};
+    char payload[] = "{\"reason\":\"\\ud83d\"}";
+    struct mosquitto_message message = {
+        .topic = "iwheel/w1/cmd/stop", .payload = payload, .payloadlen = (int)strlen(payload), .retain = true};
+    mqtt_bridge_command(&bridge, &message, &labels);
+    pass(50);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
+    message.retain = false;
+    mqtt_bridge_command(&bridge, &message, &labels);
+    TEST_ASSERT_NULL(bridge_lease_key(&bridge.lease));
+    pass(50);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, daemon_rig_state());
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_CLIENT_STOP, cause_of_the_stop());
+    message.topic = "iwheel/w1/cmd/estop";
+    mqtt_bridge_command(&bridge, &message, &labels);
+    pass(50);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
+}
+
 static void test_sender_that_stopped_drives_nothing_without_arm(void) {
     char fields[128];
     (void)snprintf(fields, sizeof fields, ",\"left_mm_s\":100,\"right_mm_s\":100,\"key\":\"%s\"", key);
@@ -208,6 +229,7 @@ int main(void) {
     RUN_TEST(test_broker_lost_stops_the_wheels_with_the_cause_client_stop);
     RUN_TEST(test_broker_lost_and_back_drives_nothing_without_arm);
     RUN_TEST(test_sender_that_has_not_armed_drives_nothing);
+    RUN_TEST(test_stop_never_needs_json_while_a_sender_drives);
     RUN_TEST(test_sender_that_stopped_drives_nothing_without_arm);
     RUN_TEST(test_sender_has_no_lease_after_the_gateway_restarted);
     RUN_TEST(test_gateway_that_hangs_is_offline_after_2_s_until_its_next_state);

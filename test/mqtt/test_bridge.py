@@ -305,6 +305,27 @@ def test_retained_command_does_nothing_now_or_at_any_start(rig):
     driver.end()
 
 
+def test_stop_never_refused_by_mqtt_in_motion_without_json(rig):
+    """Its age is not known, so only a retained one does nothing."""
+    far = rig.start_online()
+    driver = Driver(rig)
+    rig.end_bridge()
+    far.client.publish(f"iwheel/{ID}/cmd/stop", b'{"cmd":"stop"', qos=1, retain=True)
+    time.sleep(0.3)
+    rig.start_bridge()
+    rig.online(far)
+    until(lambda: counts(far)["garbled"] == 1, what="the retained one is counted")
+    assert rig.gateway_state()["state"] == "armed"
+    sent_us = now_us()
+    far.client.publish(f"iwheel/{ID}/cmd/stop", b'{"reason":"\\ud83d"}', qos=1)
+    assert braking_ms(rig, sent_us) < 1000
+    driver.end()
+    driver = Driver(rig)
+    far.client.publish(f"iwheel/{ID}/cmd/estop", b'{"reason":"cut', qos=1)
+    until(lambda: rig.gateway_state()["state"] == "latched", what="latched")
+    driver.end()
+
+
 def test_garbage_is_dropped_counted_and_changes_nothing(rig):
     far = rig.start_online()
     quote = far.quote()

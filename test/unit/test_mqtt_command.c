@@ -294,6 +294,47 @@ TEST(test_stop_never_refused_by_mqtt_for_a_field_or_its_reason) {
     expect_estop(request, value);
 }
 
+/// The payload is dropped as garbled, and this request is sent to the gateway anyway; empty: none.
+static void assert_garbled(const char *request, const char *verb, const char *text, bool retained) {
+    const mqtt_command_t command = {.verb = verb, .payload = text, .length = strlen(text), .retained = retained};
+    mqtt_judge(&judge, &rules, &command, NOW_US, &order);
+    TEST_ASSERT_EQUAL_MESSAGE(MQTT_GARBLED, order.verdict, text);
+    TEST_ASSERT_EQUAL_STRING_MESSAGE(request, order.request, text);
+    TEST_ASSERT_EQUAL_STRING_MESSAGE(
+        (request[0] != '\0') ? "not a JSON object; the stop is executed" : "not a JSON object", order.why, text);
+    TEST_ASSERT_EQUAL_STRING("", order.to);
+}
+
+/// Nothing states its age.
+TEST(test_stop_never_refused_by_mqtt_without_a_json_object) {
+    static const char *const texts[] = {
+        "",
+        "stop",
+        "[]",
+        "{\"boot\":\"" BOOT "\",\"t_us\":50000000",
+        "{\"boot\":\"" BOOT "\",\"t_us\":1,\"t_us\":1}",
+        "{\"from\":\"far\",\"seq\":1,\"reason\":\"\\ud83d\"}",
+    };
+    for (size_t i = 0; i < sizeof texts / sizeof texts[0]; i++) {
+        assert_garbled("{\"cmd\":\"stop\"}", "stop", texts[i], false);
+        assert_garbled("{\"cmd\":\"estop\"}", "estop", texts[i], false);
+        assert_garbled("", "stop", texts[i], true);
+        assert_garbled("", "reset", texts[i], false);
+    }
+    const mqtt_command_t asked = {.verb = "stop", .payload = "{", .length = 1, .answer_to = "iwheel/w1/reply/other"};
+    mqtt_judge(&judge, &rules, &asked, NOW_US, &order);
+    TEST_ASSERT_EQUAL_STRING("other", order.to);
+}
+
+TEST(test_stop_never_refused_by_mqtt_for_its_length) {
+    static char text[IWN_JSON_MAX + 1U];
+    memset(text, ' ', sizeof text);
+    const mqtt_command_t command = {.verb = "estop", .payload = text, .length = sizeof text};
+    mqtt_judge(&judge, &rules, &command, NOW_US, &order);
+    TEST_ASSERT_EQUAL(MQTT_GARBLED, order.verdict);
+    TEST_ASSERT_EQUAL_STRING("{\"cmd\":\"estop\"}", order.request);
+}
+
 TEST(test_command_too_long_is_garbled) {
     static char text[MQTT_COMMAND_MAX + 2U];
     memset(text, ' ', sizeof text);

@@ -295,18 +295,32 @@ static const char *read_sender(iwn_json_t root, mqtt_order_t *order) {
     return NULL;
 }
 
-/// Parses the verb, the JSON object, its sender and where the answer goes. A stop needs only the object.
-static bool read_command(mqtt_judge_t *self, const mqtt_rules_t *rules, const mqtt_command_t *command,
-                         iwn_json_t *out_root, mqtt_order_t *order) {
-    char fault[80];
-    iwn_text_t words = iwn_text_begin(fault, sizeof fault);
-    const bool known = find_verb(command->verb, &order->verb);
-    const size_t most = is_stop(order->verb) ? IWN_JSON_MAX : MQTT_COMMAND_MAX; // The reason may be long.
-    if (command->length > most || !iwn_json_check(command->payload, command->length, &self->work, out_root, &words) ||
-        iwn_json_kind(*out_root) != IWN_JSON_OBJECT) {
+/// Drops a payload that is no JSON object. A stop is executed anyway unless it is retained, because its age is unknown:
+/// returns true with its request.
+static bool drop_payload(const mqtt_rules_t *rules, const mqtt_command_t *command, mqtt_order_t *order) {
+    if (!is_stop(order->verb) || command->retained) {
         return drop(order, MQTT_GARBLED, "not a JSON object");
     }
-    const char *problem = read_sender(*out_root, order);
+    (void)drop(order, MQTT_GARBLED, "not a JSON object; the stop is executed");
+    (void)read_labels(rules, command, order); // Its sender is unknown.
+    (void)snprintf(order->request, sizeof order->request, "{\"cmd\":\"%s\"}", forms[order->verb].word);
+    return true;
+}
+
+/// Parses the JSON object.
+static bool read_payload(mqtt_judge_t *self, const mqtt_command_t *command, mqtt_verb_t verb, iwn_json_t *out_root) {
+    char fault[80];
+    iwn_text_t words = iwn_text_begin(fault, sizeof fault);
+    const size_t most = is_stop(verb) ? IWN_JSON_MAX : MQTT_COMMAND_MAX; // The reason may be long.
+    return command->length <= most &&
+           iwn_json_check(command->payload, command->length, &self->work, out_root, &words) &&
+           iwn_json_kind(*out_root) == IWN_JSON_OBJECT;
+}
+
+/// Reads the sender and where the answer goes. A stop needs neither.
+static bool read_command(const mqtt_rules_t *rules, const mqtt_command_t *command, bool known, iwn_json_t root,
+                         mqtt_order_t *order) {
+    const char *problem = read_sender(root, order);
     const char *labels = read_labels(rules, command, order); // Also of a bad sender: they name where the refusal goes.
     if (!known) {
         problem = "there is no such command";
@@ -320,10 +334,15 @@ static bool is_allowed(const mqtt_rules_t *rules, mqtt_verb_t verb) {
     return (rules->may_drive || !forms[verb].permits) && (rules->may_reset || verb != MQTT_RESET);
 }
 
+/// Returns true if the request of `order` is executed.
 static bool judge_command(mqtt_judge_t *self, const mqtt_rules_t *rules, const mqtt_command_t *command, uint64_t now_us,
                           mqtt_order_t *order) {
     iwn_json_t root;
-    if (!read_command(self, rules, command, &root, order)) {
+    const bool known = find_verb(command->verb, &order->verb);
+    if (!read_payload(self, command, order->verb, &root)) {
+        return drop_payload(rules, command, order);
+    }
+    if (!read_command(rules, command, known, root, order)) {
         return false;
     }
     if (!write_request(root, order)) {

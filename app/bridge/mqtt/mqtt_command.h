@@ -6,8 +6,9 @@
 /// name `from` and a `seq` that increases. Its age is the monotonic time of this machine since `t_us`; no other clock
 /// is used. Commands that are retained, late, duplicated, out of order or from another run of the bridge are dropped
 /// and counted. A stop only needs its age: no sender, `seq`, property, unknown field or reason refuses it. The usable
-/// part of the reason is passed on. `from` is a label: any client with the right to publish may use any name. The right
-/// to drive is the `key` of the reply to `arm`.
+/// part of the reason is passed on. A stop whose payload is no JSON object has no age: it is dropped with MQTT_GARBLED,
+/// and executed anyway unless it is retained. `from` is a label: any client with the right to publish may use any name.
+/// The right to drive is the `key` of the reply to `arm`.
 ///
 /// A response topic of MQTT 5 is valid only among the replies of this machine, so that no client makes the bridge write
 /// to other topics.
@@ -89,7 +90,7 @@ typedef struct {
     bool moves;              ///< A well-formed command with a value that is not zero, dropped or not.
     char key[MQTT_KEY_SIZE]; ///< Key of a command that drives; empty: none.
     char why[160];           ///< Cause and fix, unless it is accepted.
-    char request[1024];      ///< Request to the gateway, unless the command is dropped or MQTT_HELLO.
+    char request[1024];      ///< Request to the gateway; empty: the command is not executed.
 } mqtt_order_t;
 
 /// Last command of each sender. All zero at first.

@@ -92,7 +92,7 @@ static void take_answer(void *context, const iwc_message_t *reply) {
         (void)snprintf(self->order.key, sizeof self->order.key, "%s", (key != NULL) ? key : "");
         bridge->silent_us = bridge->now_us + MQTT_FIRST_US;
     }
-    answer(bridge, &self->order, reply);
+    answer(bridge, &self->order, (self->order.verdict == MQTT_TAKEN) ? reply : NULL);
 }
 
 static void ask(mqtt_bridge_t *self, const mqtt_order_t *order) {
@@ -214,7 +214,7 @@ void mqtt_bridge_command(void *context, const struct mosquitto_message *message,
     if (order.moves) {
         bridge_movers_note(&self->movers, order.from, self->now_us);
     }
-    if (order.verdict != MQTT_TAKEN || order.verb == MQTT_HELLO) {
+    if (order.request[0] == '\0' || order.verb == MQTT_HELLO) {
         answer(self, &order, NULL);
         return;
     }
