@@ -56,6 +56,7 @@ void iw_permit_init(iw_permit_t *self, const iw_config_t *config, iw_time_us_t n
         self->hold_us = now_us;
         self->until_release = self->latch_until_release;
         self->stop.cause = IW_CAUSE_RESTART;
+        self->stop.first = IW_CAUSE_RESTART;
         self->stop.at_once = true;
         self->stop.at_us = now_us;
         self->stop.number = 1;
@@ -109,8 +110,12 @@ static IW_APART void record_stop(iw_permit_t *self, const iw_event_t *event, iw_
     stop->cause = event->cause;
     stop->from = iw_permit_state(self);
     stop->sides = event->sides;
-    stop->first = iw_refuse_latched(self) ? stop->first : event->cause;
-    stop->latched = false;
+    stop->latched = iw_refuse_latched(self);
+    if (!stop->latched) {
+        stop->first = event->cause;
+        stop->first_sides = event->sides;
+        stop->first_detail = event->detail;
+    }
     stop->at_once = is_at_once(event);
 }
 
@@ -131,14 +136,13 @@ static void brake_after(iw_permit_t *self, iw_cause_t cause, iw_time_us_t now_us
     brake(self, &event, now_us);
 }
 
-/// If nothing is being sent, no zeros are sent either: the core does not move the wheels, and another master may drive
-/// them.
+/// From LISTENING no zeros are sent: the core does not move the wheels, and another master may drive them.
 static void latch(iw_permit_t *self, const iw_event_t *event, iw_time_us_t now_us) {
     record_stop(self, event, now_us);
     self->stop.latched = true;
-    const bool was_silent = iw_permit_demand(self) == IW_DEMAND_SILENCE;
+    const bool was_listening = self->phase == IW_PHASE_LISTENING;
     end_arming(self, (iw_refusal_t)iw_cause_rows[event->cause].refusal);
-    self->phase = was_silent ? IW_PHASE_LATCHED : IW_PHASE_CUT;
+    self->phase = was_listening ? IW_PHASE_LATCHED : IW_PHASE_CUT;
     // The client that released the hold before did not know of this latch.
     self->until_release = self->latch_until_release;
     self->at_once = is_at_once(event);
@@ -197,12 +201,12 @@ static bool is_new_estop(const iw_permit_t *self, iw_cause_t cause, iw_time_us_t
            iw_age_us(self->seen_us[cause], now_us) >= IW_PERMIT_EVENT_US;
 }
 
-/// LATCHED retains its cause, because later causes are mostly consequences of it. Only an e-stop is a stop of its own:
-/// otherwise a person who knows only the earlier stop could reset it.
+/// A latch retains its first cause, because later ones are mostly consequences of it. Only an e-stop is a stop of its
+/// own, or a person who knows only the earlier stop could reset it. It changes neither the zeros nor their time.
 void iw_permit_raise(iw_permit_t *self, const iw_event_t *event, iw_time_us_t now_us) {
     const iw_cause_t cause = event->cause;
-    if (is_new_estop(self, cause, now_us)) {
-        latch(self, event, now_us);
+    if (iw_refuse_latched(self) && is_new_estop(self, cause, now_us)) {
+        record_stop(self, event, now_us);
     }
     self->raised |= IW_CAUSE_BIT(cause);
     self->seen_us[cause] = now_us;

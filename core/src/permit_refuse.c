@@ -58,10 +58,10 @@ static iw_refusal_t refuse_blocked(const iw_permit_t *self) {
     return (self->stop.cause == IW_CAUSE_PAIR_DIVERGES) ? IW_REFUSE_PAIR_DIVERGES : IW_REFUSE_WHEEL_BLOCKED;
 }
 
-/// Returns true until the zeros after a stop have had their time. Until BRAKING becomes HOLDING the output is not zero,
-/// which refuses arm.
-static bool is_hold_due(const iw_permit_t *self, iw_time_us_t now_us) {
-    return self->phase == IW_PHASE_HOLDING &&
+/// Returns true for the client whose wheels did not follow, until the zeros of that stop have had their time. Until
+/// BRAKING becomes HOLDING the output is not zero, which refuses arm.
+static bool must_wait(const iw_permit_t *self, iw_time_us_t now_us, iw_client_t client) {
+    return self->blocked == client && self->phase == IW_PHASE_HOLDING &&
            iw_age_us(self->hold_us, now_us) < self->config->zero_hold_ms * IW_US_PER_MS;
 }
 
@@ -69,7 +69,7 @@ static iw_refusal_t refuse_lease(const iw_permit_t *self, iw_time_us_t now_us, i
     if (self->holder != IW_CLIENT_NONE && (!takeover || iw_permit_arming(self))) {
         return IW_REFUSE_BUSY;
     }
-    if (self->blocked == client && is_hold_due(self, now_us)) {
+    if (must_wait(self, now_us, client)) {
         return refuse_blocked(self);
     }
     if (stale_command(self, now_us)) {

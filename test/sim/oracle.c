@@ -518,33 +518,18 @@ static bool latches_with_a_ramp(const oracle_t *self) {
     return one && (stop->cause == IW_CAUSE_WHEEL_LOST || stop->cause == IW_CAUSE_PAIR_DIVERGES);
 }
 
-/// Only an e-stop that begins makes a new stop of a latch. It begins the zeros again, unless they are over.
-static void judge_latched_again(oracle_t *self, iw_time_us_t now_us, bool silent) {
-    const bool numbered = self->gateway->permit.stop.number == self->latch_stop + 1U;
-    if (numbered != self->estop_new || self->gateway->permit.stop.number - self->latch_stop > 1U) {
-        oracle_break(self, now_us, 208, "%u stops in one latch for %u new e-stops",
-                     (unsigned)(self->gateway->permit.stop.number - self->latch_stop), self->estop_new ? 1U : 0U);
-    }
-    const bool held = oracle_elapsed(now_us, self->latched_us, oracle_us(self->config->zero_hold_ms));
-    if (self->estop_new && !self->latched_silent && silent && !held) {
-        oracle_break(self, now_us, 209, "silent too early after an e-stop in a latch");
-    }
-    if (self->estop_new && self->latched_silent && !silent) {
-        oracle_break(self, now_us, 502, "zeros begin by an e-stop although nothing was being sent");
+/// Only an e-stop that begins makes a new stop of a latch.
+static void judge_latched_again(oracle_t *self, iw_time_us_t now_us) {
+    const uint32_t stops = self->gateway->permit.stop.number - self->latch_stop;
+    const uint32_t estops = self->estop_new ? 1U : 0U;
+    if (stops != estops) {
+        oracle_break(self, now_us, 208, "%u stops in one latch for %u new e-stops", (unsigned)stops, (unsigned)estops);
     }
 }
 
 static void begin_latch(oracle_t *self, iw_time_us_t now_us) {
-    const bool silent = iw_permit_demand(&self->gateway->permit) == IW_DEMAND_SILENCE;
-    const bool again = self->state == IW_STATE_LATCHED;
-    if (again) {
-        judge_latched_again(self, now_us, silent);
-        if (!self->estop_new) {
-            return;
-        }
-    }
     self->latched_us = self->held_us = now_us;
-    self->latched_silent = again ? silent : self->state == IW_STATE_LISTENING && !self->was_arming;
+    self->latched_silent = self->state == IW_STATE_LISTENING && !self->was_arming;
     oracle_hold_latched(self, now_us);
     if (latches_with_a_ramp(self)) {
         oracle_soft_stop(self, now_us);
@@ -561,7 +546,9 @@ void oracle_observe(oracle_t *self, iw_time_us_t now_us) {
     } else if (self->armed) {
         oracle_soft_stop(self, now_us);
     }
-    if (state == IW_STATE_LATCHED) {
+    if (state == IW_STATE_LATCHED && self->state == IW_STATE_LATCHED) {
+        judge_latched_again(self, now_us);
+    } else if (state == IW_STATE_LATCHED) {
         begin_latch(self, now_us);
     }
     self->estop_new = false;

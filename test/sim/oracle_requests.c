@@ -162,7 +162,8 @@ void oracle_reset(oracle_t *self, iw_time_us_t now_us, iw_state_t before, const 
                            stop->cause == IW_CAUSE_LOOP_HUNG;
         judge_start(self, now_us, 340, "reset");
         oracle_judge_quarrel(self, now_us);
-        if (event && !oracle_elapsed(now_us, self->latched_us, EVENT_US)) {
+        const iw_time_us_t seen_us = (stop->cause == IW_CAUSE_ESTOP_SOFTWARE) ? self->estop_us[1] : self->latched_us;
+        if (event && !oracle_elapsed(now_us, seen_us, EVENT_US)) {
             oracle_break(self, now_us, 350, "reset although the cause was seen less than a second ago");
         }
     }

@@ -160,7 +160,7 @@ TEST(test_one_person_reset_of_the_stop_before_another_estop_is_refused) {
     (void)daemon_rig_ask(other, "{\"cmd\":\"estop\",\"reason\":\"child on the ramp\"}");
     daemon_rig_run(1200); // The cause is no longer present.
     reset_of(first, "\"error\":\"stale_command\"");
-    assert_reply("{\"cmd\":\"why\"}", "(\\\"child on the ramp\\\") while latched by estop_software");
+    assert_reply("{\"cmd\":\"why\"}", "(\\\"child on the ramp\\\") while latched: software e-stop by a client; still");
     reset_of(first + 1U, "\"ok\":true");
     (void)close(other);
 }

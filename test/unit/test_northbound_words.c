@@ -15,6 +15,7 @@ static const char *sentence(iw_cause_t cause, uint8_t sides, uint32_t detail) {
     static char text[IWN_SENTENCE_SIZE];
     const iw_stop_t stop = {.number = 1,
                             .cause = cause,
+                            .first = cause,
                             .sides = sides,
                             .detail = detail,
                             .from = IW_STATE_ARMED,
@@ -48,11 +49,15 @@ TEST(test_why_names_cause_numbers_time_and_fix) {
 }
 
 TEST(test_why_reports_for_each_stop_whether_it_ramped) {
-    iw_stop_t stop = {.number = 1, .cause = IW_CAUSE_WHEEL_LOST, .from = IW_STATE_ARMED, .latched = true};
+    iw_stop_t stop = {.number = 1,
+                      .cause = IW_CAUSE_WHEEL_LOST,
+                      .first = IW_CAUSE_WHEEL_LOST,
+                      .from = IW_STATE_ARMED,
+                      .latched = true};
     char text[IWN_SENTENCE_SIZE];
     iwn_why_sentence(&stop, &context, text, sizeof text);
     TEST_ASSERT_NOT_NULL(strstr(text, "; ramped to zero, latched at"));
-    stop.cause = IW_CAUSE_PAIR_DIVERGES;
+    stop.cause = stop.first = IW_CAUSE_PAIR_DIVERGES;
     stop.latched = false;
     iwn_why_sentence(&stop, &context, text, sizeof text);
     TEST_ASSERT_NOT_NULL(strstr(text, "; ramped to zero at"));
@@ -64,7 +69,9 @@ TEST(test_why_reports_for_each_stop_whether_it_ramped) {
 TEST(test_why_of_an_estop_while_latched_names_the_first_cause) {
     const iw_stop_t stop = {.number = 2,
                             .cause = IW_CAUSE_ESTOP_LINE,
-                            .first = IW_CAUSE_OVERSPEED,
+                            .first = IW_CAUSE_FEEDBACK_SIGN,
+                            .first_sides = IW_SIDES_LEFT,
+                            .first_detail = 312,
                             .from = IW_STATE_LATCHED,
                             .detail = 1,
                             .at_us = 12345678,
@@ -72,14 +79,16 @@ TEST(test_why_of_an_estop_while_latched_names_the_first_cause) {
                             .at_once = true};
     char text[IWN_SENTENCE_SIZE];
     iwn_why_sentence(&stop, &context, text, sizeof text);
-    TEST_ASSERT_EQUAL_STRING("e-stop unix:/e pressed while latched by overspeed; still latched at 12.345 s; release "
-                             "the button, then: iwheelctl reset",
+    TEST_ASSERT_EQUAL_STRING("e-stop unix:/e pressed while latched: left wheel turns against its command at 312 mm/s; "
+                             "still latched at 12.345 s; release the button, check invert in the configuration, then: "
+                             "iwheelctl reset",
                              text);
 }
 
 /// The same cause stops, or latches the third time.
 TEST(test_why_requires_a_reset_only_after_a_latch) {
-    iw_stop_t stop = {.number = 3, .cause = IW_CAUSE_PAIR_DIVERGES, .from = IW_STATE_ARMED};
+    iw_stop_t stop = {
+        .number = 3, .cause = IW_CAUSE_PAIR_DIVERGES, .first = IW_CAUSE_PAIR_DIVERGES, .from = IW_STATE_ARMED};
     char text[IWN_SENTENCE_SIZE];
     iwn_why_sentence(&stop, &context, text, sizeof text);
     TEST_ASSERT_NOT_NULL(strstr(text, "turns freely and drives, then arm again"));
@@ -89,7 +98,7 @@ TEST(test_why_requires_a_reset_only_after_a_latch) {
 }
 
 TEST(test_why_after_a_crash_has_no_unknown_values) {
-    const iw_stop_t stop = {.number = 1, .cause = IW_CAUSE_RESTART, .at_once = true};
+    const iw_stop_t stop = {.number = 1, .cause = IW_CAUSE_RESTART, .first = IW_CAUSE_RESTART, .at_once = true};
     char text[IWN_SENTENCE_SIZE];
     iwn_why_sentence(&stop, &context, text, sizeof text);
     TEST_ASSERT_EQUAL_STRING(

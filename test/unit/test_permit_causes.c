@@ -128,6 +128,8 @@ TEST(test_permit_first_cause_of_a_latch_stays_the_cause) {
         const bool estop = rows[i].cause == IW_CAUSE_ESTOP_LINE || rows[i].cause == IW_CAUSE_ESTOP_SOFTWARE;
         TEST_ASSERT_EQUAL_INT(estop ? rows[i].cause : IW_CAUSE_WHEEL_LOST, rig.permit.stop.cause);
         TEST_ASSERT_EQUAL_INT(IW_CAUSE_WHEEL_LOST, rig.permit.stop.first);
+        TEST_ASSERT_EQUAL_UINT8(IW_SIDES_BOTH, rig.permit.stop.first_sides);
+        TEST_ASSERT_EQUAL_UINT32(42, rig.permit.stop.first_detail);
         TEST_ASSERT_EQUAL_UINT32(estop ? 2U : 1U, rig.permit.stop.number);
     }
 }
@@ -151,6 +153,27 @@ TEST(test_permit_estop_while_latched_is_a_new_stop_once_a_second) {
         }
         permit_rig_raise(&rig, IW_CAUSE_INTERNAL);
         TEST_ASSERT_EQUAL_UINT32(3, rig.permit.stop.number);
+    }
+}
+
+/// Otherwise a client that repeats it, or a loose wire, would hold the zeros, and a second master, without end.
+TEST(test_permit_estop_in_a_latch_does_not_prolong_the_zeros) {
+    for (unsigned moving = 0; moving < 2U; moving++) {
+        permit_rig_begin(&rig, PERMIT_LATCHED);
+        rig.view.output_zero = true;
+        rig.view.settled = moving == 0U;
+        const uint32_t last_ms = (moving == 0U) ? 1500U : 60000U;
+        for (uint32_t ms = 100; ms < last_ms; ms += 100U) {
+            permit_rig_wait(&rig, MS(100));
+            permit_rig_assert(&rig, IW_STATE_LATCHED, IW_DEMAND_ZERO);
+            if (ms % 1200U == 0U) {
+                permit_rig_raise(&rig, IW_CAUSE_ESTOP_SOFTWARE);
+            }
+        }
+        TEST_ASSERT_GREATER_THAN_UINT32(1, rig.permit.stop.number);
+        permit_rig_wait(&rig, MS(100));
+        permit_rig_assert(&rig, IW_STATE_LATCHED, IW_DEMAND_SILENCE);
+        TEST_ASSERT_EQUAL_UINT32(moving, rig.permit.still_moving);
     }
 }
 

@@ -138,7 +138,9 @@ void gw_wheels_note_stop(gw_wheels_t *self, const iw_stop_t *stop) {
         self, stop->number,
         &(blackbox_entry_t){
             .kind = BLACKBOX_STOPPED, .a = (uint8_t)stop->cause, .b = stop->sides, .as = {.value = stop->detail}});
-    gw_tape_mark(&self->tape);
+    if (stop->from != IW_STATE_LATCHED) { // Otherwise the frames of the latch's first cause remain.
+        gw_tape_mark(&self->tape);
+    }
 }
 
 void gw_wheels_note_state(gw_wheels_t *self, const iw_snapshot_t *seen, iw_state_t before) {

@@ -181,17 +181,19 @@ static inline const char *iw_refusal_text(iw_refusal_t refusal) {
 
 /// The last stop, for `why`.
 typedef struct {
-    iw_time_us_t at_us; ///< Time of the stop.
-    uint32_t number;    ///< Number of stops so far; 0 if there was none.
-    uint32_t detail;    ///< See iw_cause_t.
-    iw_client_t client; ///< Client that held the lease, or that requested the stop.
-    iw_pair_t applied;  ///< Last pair before the stop, in the machine's frame.
-    iw_cause_t cause;   ///< The first cause, or the cause of an e-stop that began while latched.
-    iw_cause_t first;   ///< The first cause of the latch, if `latched`. It differs from `cause` after such an e-stop.
-    iw_state_t from;    ///< State before the stop.
-    uint8_t sides;      ///< Wheels that the cause refers to: IW_SIDES_...
-    bool latched;       ///< The stop needs a reset.
-    bool at_once;       ///< The stop was a zero without a ramp.
+    iw_time_us_t at_us;    ///< Time of the stop.
+    uint32_t number;       ///< Number of stops so far; 0 if there was none.
+    uint32_t detail;       ///< See iw_cause_t.
+    iw_client_t client;    ///< Client that held the lease, or that requested the stop.
+    iw_pair_t applied;     ///< Last pair before the stop, in the machine's frame.
+    iw_cause_t cause;      ///< The cause. In a latch an e-stop that begins is a stop of its own.
+    iw_state_t from;       ///< State before the stop.
+    uint8_t sides;         ///< Wheels that the cause refers to: IW_SIDES_...
+    bool latched;          ///< The stop needs a reset.
+    bool at_once;          ///< The stop was a zero without a ramp.
+    uint8_t first_sides;   ///< `sides` of the first cause of the latch.
+    iw_cause_t first;      ///< The first cause of the latch. After such an e-stop it differs from `cause`.
+    uint32_t first_detail; ///< `detail` of the first cause.
 } iw_stop_t;
 
 /// Facts that the document leaves open. The core assumes each of them until a measurement or the operator decides it.

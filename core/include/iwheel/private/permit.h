@@ -30,8 +30,8 @@
 ///
 /// With `iw_config_t::hold` (R19) time ends neither HOLDING nor CUT, RESTARTING becomes HOLDING, and `reset` leads from
 /// CUT to HOLDING. The hold ends by a setpoint of another sender, by `iw_permit_release`, and by the end of the
-/// gateway. Then time ends the zeros, as without the option. A latch after a release, or an e-stop in that latch, while
-/// zeros are still sent, holds again.
+/// gateway. Then time ends the zeros, as without the option. A latch after a release, while zeros are still sent, holds
+/// again.
 ///
 /// Only an accepted drive command extends the lease.
 #ifndef IW_PERMIT_H
@@ -130,8 +130,8 @@ typedef struct {
 /// setpoints. Two setpoints per wheel do not count, because the dead process may have left them in its controller.
 void iw_permit_init(iw_permit_t *self, const iw_config_t *config, iw_time_us_t now_us, bool restarted);
 
-/// Reports that a cause is present or has just occurred. It takes effect immediately. The first cause of a latch
-/// remains its cause, except that an e-stop that begins is a new stop. Repeated within IW_PERMIT_EVENT_US it is the same.
+/// Reports that a cause is present or has just occurred. It takes effect immediately. In a latch only an e-stop that
+/// begins is a new stop. Repeated within IW_PERMIT_EVENT_US it is the same.
 void iw_permit_raise(iw_permit_t *self, const iw_event_t *event, iw_time_us_t now_us);
 
 /// Reports that this step cannot judge ages: SEND_STALLED and WHEEL_LOST remain present if they were present.

@@ -163,7 +163,7 @@ void iwn_write_machine(const iw_snapshot_t *seen, const iwn_surroundings_t *arou
     iwn_out_text(json, "version", around->version);
     iwn_out_text(json, "state", iwn_state_name(seen->state));
     iwn_out_bool(json, "arming", seen->arming);
-    iwn_out_text(json, "cause", stopped ? iwn_cause_name(seen->stop->cause) : NULL);
+    iwn_out_text(json, "cause", stopped ? iwn_cause_name(seen->stop->first) : NULL);
     write_causes("present", seen->present, json);
     write_lease(seen, &around->holder, json);
     write_bus(seen, &around->bus, json);

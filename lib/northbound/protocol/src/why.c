@@ -69,20 +69,27 @@ static const row_t rows[IW_CAUSES] = {
          "check that the wheel turns freely and drives"},
 };
 
-static const char *detail_words(const iw_stop_t *stop) {
-    if (stop->cause == IW_CAUSE_ESTOP_LINE) {
-        return (stop->detail == 2U) ? "unreadable or gone" : "pressed";
+/// What a clause is about: the cause of a stop, or the first cause of its latch.
+typedef struct {
+    uint32_t detail;
+    iw_cause_t cause;
+    uint8_t sides;
+} event_t;
+
+static const char *detail_words(const event_t *event) {
+    if (event->cause == IW_CAUSE_ESTOP_LINE) {
+        return (event->detail == 2U) ? "unreadable or gone" : "pressed";
     }
-    if (stop->cause == IW_CAUSE_BUS_DOWN) {
-        return (stop->detail == IW_BUS_OFF) ? "bus-off" : "down or gone";
+    if (event->cause == IW_CAUSE_BUS_DOWN) {
+        return (event->detail == IW_BUS_OFF) ? "bus-off" : "down or gone";
     }
-    return reboot_sign(stop->detail);
+    return reboot_sign(event->detail);
 }
 
-static const char *word_for(char part, const iw_stop_t *stop, const iwn_why_context_t *context) {
+static const char *word_for(char part, const event_t *event, const iwn_why_context_t *context) {
     switch (part) {
     case 'w':
-        return wheels(stop->sides);
+        return wheels(event->sides);
     case 'c':
         return (context->client != NULL) ? context->client : "a client";
     case 'b':
@@ -90,32 +97,32 @@ static const char *word_for(char part, const iw_stop_t *stop, const iwn_why_cont
     case 'e':
         return context->estop;
     default:
-        return detail_words(stop);
+        return detail_words(event);
     }
 }
 
-static void add_part(char part, const iw_stop_t *stop, const iwn_why_context_t *context, iwn_text_t *text) {
+static void add_part(char part, const event_t *event, const iwn_why_context_t *context, iwn_text_t *text) {
     if (part == 'n') {
-        iwn_text_int(text, stop->detail);
+        iwn_text_int(text, event->detail);
     } else if (part == 'x') {
-        iwn_text_hex(text, stop->detail, hex_digits(stop->detail));
+        iwn_text_hex(text, event->detail, hex_digits(event->detail));
     } else if (part != 'r') {
-        iwn_text_add(text, word_for(part, stop, context));
+        iwn_text_add(text, word_for(part, event, context));
     } else if (context->reason != NULL && context->reason[0] != '\0') {
         IWN_TEXT_JOIN(text, " (\"", context->reason, "\")");
     }
 }
 
-static void add_clause(const iw_stop_t *stop, const iwn_why_context_t *context, iwn_text_t *text) {
-    const bool known = (unsigned)stop->cause < IW_CAUSES;
-    const char *clause = known ? rows[stop->cause].clause : iwn_cause_name(stop->cause);
-    if (stop->cause == IW_CAUSE_WHEEL_LOST && stop->detail == UINT32_MAX) {
+static void add_clause(const event_t *event, const iwn_why_context_t *context, iwn_text_t *text) {
+    const bool known = (unsigned)event->cause < IW_CAUSES;
+    const char *clause = known ? rows[event->cause].clause : iwn_cause_name(event->cause);
+    if (event->cause == IW_CAUSE_WHEEL_LOST && event->detail == UINT32_MAX) {
         clause = "$w never sent telemetry";
     }
     for (; *clause != '\0'; clause++) {
         if (*clause == '$') {
             clause++;
-            add_part(*clause, stop, context, text);
+            add_part(*clause, event, context, text);
         } else {
             iwn_text_span(text, clause, 1U);
         }
@@ -142,9 +149,7 @@ static void add_doing(const iw_stop_t *stop, iwn_text_t *text) {
         add_number(text, stop->applied.wheel[IW_LEFT].speed_mm_s, "/");
         add_number(text, stop->applied.wheel[IW_RIGHT].speed_mm_s, " mm/s");
     } else if (stop->cause != IW_CAUSE_RESTART) { // Otherwise the gateway does not know it.
-        const bool latched = stop->from == IW_STATE_LATCHED;
-        IWN_TEXT_JOIN(text, " while ", iwn_state_name(stop->from), latched ? " by " : "",
-                      latched ? iwn_cause_name(stop->first) : "");
+        IWN_TEXT_JOIN(text, " while ", iwn_state_name(stop->from));
     }
 }
 
@@ -162,11 +167,23 @@ void iwn_why_sentence(const iw_stop_t *stop, const iwn_why_context_t *context, c
         iwn_text_add(&text, "no stop since the gateway started");
         return;
     }
-    add_clause(stop, context, &text);
+    const event_t last = {stop->detail, stop->cause, stop->sides};
+    const event_t first = {stop->first_detail, stop->first, stop->first_sides};
+    // The client of the first stop may be another.
+    const iwn_why_context_t bare = {.estop = context->estop, .bus = context->bus};
+    add_clause(&last, context, &text);
     add_doing(stop, &text);
+    if (stop->from == IW_STATE_LATCHED) {
+        iwn_text_add(&text, ": ");
+        add_clause(&first, &bare, &text);
+    }
     IWN_TEXT_JOIN(&text, "; ", manner(stop), " at ");
     add_time(stop->at_us, &text);
-    IWN_TEXT_JOIN(&text, "; ", iwn_why_fix(stop->cause), iwn_why_then(stop->cause, stop->latched));
+    IWN_TEXT_JOIN(&text, "; ", iwn_why_fix(stop->cause));
+    if (stop->first != stop->cause) {
+        IWN_TEXT_JOIN(&text, ", ", iwn_why_fix(stop->first));
+    }
+    iwn_text_add(&text, iwn_why_then(stop->cause, stop->latched));
 }
 
 const char *iwn_why_fix(iw_cause_t cause) {

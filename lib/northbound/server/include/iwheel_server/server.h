@@ -79,7 +79,8 @@ typedef struct iwn_server {
     iwn_estop_t estop; ///< Set before iwn_server_observe.
 
     // The caller reads these members.
-    iw_time_us_t stopped_us, estopped_us; ///< Time of the last request of a client; 0 if there was none.
+    /// Times of the last requests of clients; 0 if there was none. `stopped_us` also of the e-stop line, while pressed.
+    iw_time_us_t stopped_us, estopped_us;
     iw_client_t stopped_by, estopped_by;  ///< Client of that request.
     iwn_reported_t reported;
     iw_snapshot_t seen;        ///< Snapshot of iwn_server_snapshot.
