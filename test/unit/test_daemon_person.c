@@ -165,6 +165,46 @@ TEST(test_one_person_reset_of_the_stop_before_another_estop_is_refused) {
     (void)close(other);
 }
 
+static void press_for(unsigned ms) {
+    daemon_rig.estop = 1;
+    daemon_rig_run(ms);
+    daemon_rig.estop = 0;
+    daemon_rig_run(100); // Longer than the debounce time.
+}
+
+/// A person presses the button after a fault: the fault remains what the machine reports, with its frames.
+TEST(test_one_person_button_after_a_latch_does_not_hide_its_cause) {
+    static char before[4096];
+    char key[KEY_DIGITS + 1U];
+    arm_with_key(client, key);
+    assert_reply(drive_with(key, 200), "\"ok\":true");
+    daemon_rig_run(100);
+    latch();
+    (void)daemon_rig_ask(client, "{\"cmd\":\"why\"}");
+    const char *frames = strstr(daemon_rig.reply, "\"frames_before\":[{");
+    TEST_ASSERT_NOT_NULL(frames);
+    (void)snprintf(before, sizeof before, "%.300s", frames);
+    const unsigned first = stop_number();
+    press_for(200);
+    TEST_ASSERT_EQUAL_UINT(first + 1U, stop_number());
+    assert_reply("{\"cmd\":\"status\"}", "\"cause\":\"estop_software\"");
+    assert_reply("{\"cmd\":\"why\"}", "\"cause\":\"estop_line\"");
+    TEST_ASSERT_NOT_NULL(strstr(daemon_rig.reply, before));
+}
+
+/// The button is pressed again within the time of an event, so the number is the same: the time decides.
+TEST(test_one_person_reset_from_before_the_button_was_pressed_is_late) {
+    press_for(200);
+    const iw_time_us_t asked_us = daemon_rig.now_us;
+    press_for(500);
+    daemon_rig_run(200);
+    (void)snprintf(line_, sizeof line_, "{\"cmd\":\"reset\",\"stop\":%u,\"t_us\":%llu}", stop_number(),
+                   (unsigned long long)asked_us);
+    assert_reply(line_, "\"error\":\"stale_command\"");
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
+    assert_reply(aged("reset", 100), "\"ok\":true");
+}
+
 /// Within the time of an event it is the same stop. An older reset is late by its time.
 TEST(test_one_person_reset_from_before_a_second_estop_is_late) {
     const int other = daemon_rig_connect();

@@ -292,6 +292,7 @@ TEST(test_permit_restarted_sends_zeros_before_listening) {
     permit_rig_init_restarted(&rig);
     permit_rig_assert(&rig, IW_STATE_STOPPING, IW_DEMAND_ZERO);
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_RESTART, rig.permit.stop.cause);
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_RESTART, rig.permit.stop.first);
     TEST_ASSERT_EQUAL_UINT32(1, rig.permit.stop.number);
     TEST_ASSERT_TRUE(rig.permit.stop.at_us == FIXTURE_START_US);
     assert_holding_until(MS(1500), IW_STATE_LISTENING);
