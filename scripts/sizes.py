@@ -40,7 +40,7 @@ OBSERVATION = "iw_observation_init iw_observation_step"
 USES = {
     "codec": ("codec.h", CODEC, 350),
     "codec, setpoints, force": ("codec.h force_offset.h private/setpoint.h", f"{CODEC} {SETPOINT} {FORCE}", 2900),
-    "gateway": ("gateway.h", GATEWAY, 13150),
+    "gateway": ("gateway.h", GATEWAY, 13200),
     "gateway, snapshot": ("gateway.h", f"{GATEWAY} iw_gateway_snapshot", None),
     "all": ("gateway.h observation.h", f"{GATEWAY} {KNOWN} iw_gateway_snapshot {OBSERVATION}", None),
 }

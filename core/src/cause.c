@@ -50,6 +50,11 @@ uint32_t iw_cause_present(uint32_t reported, const iw_time_us_t seen_us[IW_CAUSE
     return present;
 }
 
+bool iw_cause_is_new_estop(iw_cause_t cause, const iw_time_us_t seen_us[IW_CAUSES], iw_time_us_t now_us) {
+    return (cause == IW_CAUSE_ESTOP_LINE || cause == IW_CAUSE_ESTOP_SOFTWARE) &&
+           iw_age_us(seen_us[cause], now_us) >= IW_PERMIT_EVENT_US;
+}
+
 /// The first of several causes determines the refusal. The order of iw_cause_t puts a cause before its consequences:
 /// for example, a bus that is down also loses echoes and wheels.
 iw_refusal_t iw_cause_refusal(uint32_t present) {

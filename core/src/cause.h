@@ -30,4 +30,8 @@ uint32_t iw_cause_present(uint32_t reported, const iw_time_us_t seen_us[IW_CAUSE
 /// is empty.
 iw_refusal_t iw_cause_refusal(uint32_t present);
 
+/// Returns true for an e-stop that begins. A bounce of the button, or another request within the time of an event,
+/// belongs to the one before. Contacts that disagree are a fault, not a press.
+bool iw_cause_is_new_estop(iw_cause_t cause, const iw_time_us_t seen_us[IW_CAUSES], iw_time_us_t now_us);
+
 #endif

@@ -194,18 +194,11 @@ static void stop_holder(iw_permit_t *self, const iw_event_t *event, iw_time_us_t
     }
 }
 
-/// Returns true for an e-stop that begins. A bounce of the button, or another request within the time of an event,
-/// belongs to the one before. Contacts that disagree are a fault, not a press.
-static bool is_new_estop(const iw_permit_t *self, iw_cause_t cause, iw_time_us_t now_us) {
-    return (cause == IW_CAUSE_ESTOP_LINE || cause == IW_CAUSE_ESTOP_SOFTWARE) &&
-           iw_age_us(self->seen_us[cause], now_us) >= IW_PERMIT_EVENT_US;
-}
-
 /// A latch retains its first cause, because later ones are mostly consequences of it. Only an e-stop is a stop of its
 /// own, or a person who knows only the earlier stop could reset it. It changes neither the zeros nor their time.
 void iw_permit_raise(iw_permit_t *self, const iw_event_t *event, iw_time_us_t now_us) {
     const iw_cause_t cause = event->cause;
-    if (iw_refuse_latched(self) && is_new_estop(self, cause, now_us)) {
+    if (iw_refuse_latched(self) && iw_cause_is_new_estop(cause, self->seen_us, now_us)) {
         record_stop(self, event, now_us);
     }
     self->raised |= IW_CAUSE_BIT(cause);
