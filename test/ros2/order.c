@@ -12,6 +12,17 @@
 
 #include "fake_ros.inc"
 
+static bool why_is_lost;
+
+iwc_result_t __real_iwc_ask(iwc_t *self, const char *line, int timeout_ms, iwc_message_t *out_reply);
+iwc_result_t __wrap_iwc_ask(iwc_t *self, const char *line, int timeout_ms, iwc_message_t *out_reply);
+
+/// Loses the reply to `why`, as a slow or disturbed serial line does.
+iwc_result_t __wrap_iwc_ask(iwc_t *self, const char *line, int timeout_ms, iwc_message_t *out_reply) {
+    const bool lost = why_is_lost && strstr(line, "\"why\"") != NULL;
+    return lost ? IWC_TIMEOUT : __real_iwc_ask(self, line, timeout_ms, out_reply);
+}
+
 // ---- messages -------------------------------------------------------------------------------------------------------
 
 static void command_comes(double v_m_s) {
@@ -53,7 +64,7 @@ static void arm(void) {
 }
 
 void setUp(void) {
-    has_command = has_request = answered = success = is_used = false;
+    has_command = has_request = answered = success = is_used = why_is_lost = false;
     estop_shown = -1;
     estop_count = 0;
     daemon_rig_begin();
@@ -471,6 +482,23 @@ static void test_ros_rate_of_snapshots_is_full_with_the_lease(void) {
     TEST_ASSERT_UINT_WITHIN(2, 50, snapshot_count - before);
 }
 
+/// A person has stopped the wheels while the bridge was away. Without the reply to `why` it must not conclude that there was no stop.
+static void test_ros_lost_reply_about_the_last_stop_is_no_connection(void) {
+    const int other = daemon_rig_connect();
+    why_is_lost = true;
+    iwc_close(bridge.gateway);
+    pass(20);
+    (void)daemon_rig_ask(other, "{\"cmd\":\"estop\"}");
+    pass(2000);
+    TEST_ASSERT_EQUAL_INT(ROS_LINK_GONE, bridge.facts.link);
+    why_is_lost = false;
+    pass(4000);
+    TEST_ASSERT_EQUAL_INT(ROS_LINK_UP, bridge.facts.link);
+    TEST_ASSERT_TRUE(bridge.facts.machine.stop_number.known);
+    TEST_ASSERT_NOT_NULL(strstr(bridge.facts.machine.stop, "software e-stop"));
+    (void)close(other);
+}
+
 /// All places of the gateway are in use, one of them by the driver, when the bridge has lost its connection.
 static void test_ros_stop_reaches_a_full_gateway_without_a_connection(void) {
     sock_clients_t *clients = &daemon_rig.daemon->clients;
@@ -524,6 +552,7 @@ int main(void) {
     RUN_TEST(test_ros_bridge_that_only_watches_does_not_arm);
     RUN_TEST(test_ros_rate_of_snapshots_falls_without_a_node);
     RUN_TEST(test_ros_rate_of_snapshots_is_full_with_the_lease);
+    RUN_TEST(test_ros_lost_reply_about_the_last_stop_is_no_connection);
     RUN_TEST(test_ros_stop_reaches_a_full_gateway_without_a_connection);
     return UNITY_END();
 }

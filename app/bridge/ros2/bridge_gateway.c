@@ -41,18 +41,19 @@ void bridge_lose(bridge_t *self, const char *why) {
     self->gone_reported = true;
 }
 
-/// Reads the last stop that the gateway reports. This bridge did not cause it: it happened before the connection.
-static void read_last_stop(bridge_t *self) {
+/// Reads the last stop that the gateway reports. This bridge did not cause it: it happened before the connection. No
+/// reply does not mean that there was none.
+static iwc_result_t read_last_stop(bridge_t *self) {
     iwc_message_t why;
-    if (iwc_ask(self->gateway, "{\"cmd\":\"why\"}", BRIDGE_ASK_MS, &why) == IWC_OK &&
-        iwc_integer(&why, "number").value > 0) {
+    const iwc_result_t result = iwc_ask(self->gateway, "{\"cmd\":\"why\"}", BRIDGE_ASK_MS, &why);
+    self->facts.machine.stop[0] = '\0';
+    self->facts.machine.stop_number = (iwc_value_t){.known = false};
+    if (result == IWC_OK && iwc_integer(&why, "number").value > 0) {
         self->facts.machine.stop_number = iwc_integer(&why, "number");
         (void)iwc_text(&why, "sentence", self->facts.machine.stop, sizeof self->facts.machine.stop);
         ros_auto_stopped(&self->auto_arm, false);
-    } else {
-        self->facts.machine.stop[0] = '\0';
-        self->facts.machine.stop_number = (iwc_value_t){.known = false};
     }
+    return result;
 }
 
 /// Reads the values that the assumption store of a board does not have. Without them the bridge would compute with the
@@ -125,7 +126,9 @@ iwc_result_t bridge_call(bridge_t *self) {
         result = IWC_OK;
     }
     if (result == IWC_OK) {
-        read_last_stop(self);
+        result = read_last_stop(self);
+    }
+    if (result == IWC_OK) {
         result = iwc_ask(self->gateway, "{\"cmd\":\"status\"}", BRIDGE_ASK_MS, &status);
     }
     if (result == IWC_OK && ros_facts_lack_values(&status)) {
