@@ -119,14 +119,13 @@ static void read_condition(const iwc_message_t *state, char *out, size_t size) {
     const iwc_message_t estop_field = iwc_field(&cursor, "estop");
     const iwc_message_t left = iwc_field(&cursor, "left");
     const iwc_message_t right = iwc_field(&cursor, "right");
-    const iwc_message_t rolling = iwc_field(&cursor, "rolling");
     (void)iwc_text(&machine_field, "", machine, sizeof machine);
     (void)iwc_text(&cause_field, "", cause, sizeof cause);
     (void)iwc_text(&estop_field, "state", estop, sizeof estop);
     (void)iwc_text(&bus_field, "state", bus, sizeof bus);
-    (void)snprintf(out, size, "%s %s %s %s %lld %d%d%d", machine, cause, estop, bus,
+    (void)snprintf(out, size, "%s %s %s %s %lld %d%d", machine, cause, estop, bus,
                    (long long)iwc_integer(&lease, "holder").value, iwc_truth(&left, "heard").value == 1,
-                   iwc_truth(&right, "heard").value == 1, iwc_truth(&rolling, "").value == 1);
+                   iwc_truth(&right, "heard").value == 1);
 }
 
 /// Returns the rate at which the gateway must send its state.
@@ -195,6 +194,8 @@ static void take_event(void *context, const iwc_message_t *event, uint64_t now_u
     } else {
         if (strcmp(name, "lease") == 0) {
             take_lease(self, event);
+        } else if (strcmp(name, "rolling") == 0) {
+            self->condition[0] = '\0'; // The next state is sent immediately. In the state itself it is far behind.
         }
         const size_t length =
             mqtt_write_event(self->boot, self->spool.last + 1U, bridge_wall_us(), event, buffer(self));
