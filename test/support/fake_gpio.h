@@ -11,7 +11,9 @@ typedef struct {
     int edges_error; ///< errno of reading edges; 0: none; -1: a read without an edge is no error.
     int chip_error;  ///< errno of opening the chip; 0: it opens.
     int busy_error;  ///< errno of requesting the line; 0: the request succeeds.
-    int twin;        ///< 0: the line's name is unique; 1: another line of its chip has it; 2: one of another chip.
+    int twin; ///< 0: the line's name is unique; 1: another line of its chip has it; 2: one of another chip; 3: the
+              ///< line with its offset of another chip.
+    int link; ///< 0: its chip has one node; 1, 2: a link to it is listed before, or after, the node.
 
     const char *label; ///< Label of the line's chip; NULL: FAKE_GPIO_LABEL.
     bool unnamed;      ///< The line has no name of its own.
@@ -43,6 +45,8 @@ int fake_gpio_take(unsigned buffer_size);
 #define FAKE_GPIO_LABEL  "pinctrl-fake"
 #define FAKE_GPIO_NAME   "ESTOP"
 #define FAKE_GPIO_OFFSET 17U
+/// The link to the line's own chip. The kernel knows only the chip's own name.
+#define FAKE_GPIO_LINK "gpiochip4"
 /// Lines of each chip.
 #define FAKE_GPIO_LINES 32U
 

@@ -16,7 +16,8 @@ static const iwl_gpio_address_t by_offset = {.name = FAKE_GPIO_CHIP, .offset = F
 static iwl_gpio_line_t line;
 
 const char *fake_gpio_name(bool own, unsigned offset) {
-    const bool twin = (fake_gpio.twin == 1 && own && offset == 30U) || (fake_gpio.twin == 2 && !own && offset == 0U);
+    const bool twin = (fake_gpio.twin == 1 && own && offset == 30U) || (fake_gpio.twin == 2 && !own && offset == 0U) ||
+                      (fake_gpio.twin == 3 && !own && offset == FAKE_GPIO_OFFSET);
     const bool line_itself = own && offset == FAKE_GPIO_OFFSET;
     if (line_itself && fake_gpio.unnamed) {
         return NULL;
@@ -132,13 +133,43 @@ TEST(test_line_that_cannot_open_returns_errno_and_leaks_nothing) {
 }
 
 TEST(test_line_name_that_exists_twice_is_refused) {
-    for (int twin = 1; twin <= 2; twin++) {
+    for (int twin = 1; twin <= 3; twin++) {
         iwl_gpio_line_close(&line);
         fake_gpio.twin = twin;
         TEST_ASSERT_EQUAL_INT(ENOTUNIQ, iwl_gpio_line_open(&line, &by_name));
         TEST_ASSERT_EQUAL_INT(-1, line.fd);
         TEST_ASSERT_EQUAL_INT(0, fake_gpio.open);
         TEST_ASSERT_EQUAL_INT(0, iwl_gpio_line_open(&line, &by_offset));
+    }
+}
+
+TEST(test_line_of_a_chip_with_two_nodes_is_one_line) {
+    static const iwl_gpio_address_t linked = {.name = FAKE_GPIO_LINK, .offset = FAKE_GPIO_OFFSET, .by_offset = true};
+    const iwl_gpio_address_t *const addresses[] = {&by_name, &by_offset, &linked};
+    for (size_t i = 0; i < 2U * sizeof addresses / sizeof addresses[0]; i++) {
+        iwl_estop_seen_t seen;
+        iwl_gpio_line_close(&line);
+        fake_gpio.link = (i % 2U == 0U) ? 1 : 2;
+        TEST_ASSERT_EQUAL_INT(0, iwl_gpio_line_see(addresses[i / 2U], &seen));
+        TEST_ASSERT_EQUAL_STRING(FAKE_GPIO_CHIP, seen.node); // Two names of one line are the same line.
+        TEST_ASSERT_EQUAL_UINT(FAKE_GPIO_OFFSET, seen.offset);
+        TEST_ASSERT_EQUAL_INT(0, fake_gpio.open);
+        TEST_ASSERT_EQUAL_INT(0, iwl_gpio_line_open(&line, addresses[i / 2U]));
+        TEST_ASSERT_EQUAL_UINT(FAKE_GPIO_OFFSET, fake_gpio.offset);
+        TEST_ASSERT_EQUAL_INT(1, fake_gpio.open);
+        TEST_ASSERT_EQUAL_INT(1, fake_gpio.requested);
+    }
+}
+
+TEST(test_line_name_twice_next_to_a_link_is_refused) {
+    for (int twin = 1; twin <= 3; twin++) {
+        for (fake_gpio.link = 1; fake_gpio.link <= 2; fake_gpio.link++) {
+            iwl_gpio_line_close(&line);
+            fake_gpio.twin = twin;
+            TEST_ASSERT_EQUAL_INT(ENOTUNIQ, iwl_gpio_line_open(&line, &by_name));
+            TEST_ASSERT_EQUAL_INT(-1, line.fd);
+            TEST_ASSERT_EQUAL_INT(0, fake_gpio.open);
+        }
     }
 }
 

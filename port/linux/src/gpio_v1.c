@@ -11,6 +11,14 @@
 /// Number of edges of a line that the kernel buffers.
 #define EVENTS 16U
 
+/// Returns true for one line, through two nodes of its chip, by the kernel's name of the chip. libgpiod follows links,
+/// and Raspberry Pi OS links gpiochip4 to gpiochip0 on a Raspberry Pi 5. No other chip receives the name while the
+/// first node is open.
+static bool is_same_line(struct gpiod_line *one, struct gpiod_line *other) {
+    return gpiod_line_offset(one) == gpiod_line_offset(other) &&
+           strcmp(gpiod_chip_name(gpiod_line_get_chip(one)), gpiod_chip_name(gpiod_line_get_chip(other))) == 0;
+}
+
 /// Searches one chip for lines with the name; `*found` is the first one on all chips. Returns true if there is a second
 /// one.
 static bool search_chip(struct gpiod_chip *chip, const char *name, struct gpiod_line **found) {
@@ -20,8 +28,8 @@ static bool search_chip(struct gpiod_chip *chip, const char *name, struct gpiod_
         struct gpiod_line *line = gpiod_chip_get_line(chip, offset);
         const char *own = (line == NULL) ? NULL : gpiod_line_name(line);
         if (own != NULL && strcmp(own, name) == 0) {
-            second = *found != NULL;
-            if (!second) {
+            second = *found != NULL && !is_same_line(*found, line);
+            if (*found == NULL) {
                 *found = line;
             }
         }

@@ -33,6 +33,26 @@ static unsigned count_named(struct gpiod_chip *chip, const char *name, unsigned 
     return count;
 }
 
+/// Returns true for two nodes of one chip, by the kernel's name of it. libgpiod follows links, and Raspberry Pi OS
+/// links gpiochip4 to gpiochip0 on a Raspberry Pi 5. No other chip receives the name while the first node is open.
+static bool is_same_chip(struct gpiod_chip *one, struct gpiod_chip *other) {
+    struct gpiod_chip_info *first = gpiod_chip_get_info(one);
+    struct gpiod_chip_info *second = gpiod_chip_get_info(other);
+    const bool same = first != NULL && second != NULL &&
+                      strcmp(gpiod_chip_info_get_name(first), gpiod_chip_info_get_name(second)) == 0;
+    gpiod_chip_info_free(second);
+    gpiod_chip_info_free(first);
+    return same;
+}
+
+/// Returns the number of lines with the name on a chip that is open and not the one of `found`.
+static unsigned count_new(struct gpiod_chip *chip, struct gpiod_chip *found, const char *name, unsigned *out_offset) {
+    if (chip == NULL || (found != NULL && is_same_chip(found, chip))) {
+        return 0;
+    }
+    return count_named(chip, name, out_offset);
+}
+
 static struct gpiod_chip *open_chip(const char *path) {
     errno = ENOENT;
     return gpiod_is_gpiochip_device(path) ? gpiod_chip_open(path) : NULL;
@@ -58,7 +78,7 @@ static struct gpiod_chip *search(const char *name, unsigned *out_offset) {
         if (chip == NULL && (errno == EACCES || errno == EPERM)) {
             refusal = errno;
         }
-        const unsigned here = (chip == NULL) ? 0U : count_named(chip, name, &offset);
+        const unsigned here = count_new(chip, found, name, &offset);
         count += here;
         if (here > 0U && found == NULL) {
             found = chip;

@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: MIT
 """Rows 11 to 14: the e-stop on a GPIO line."""
 
+import os
 import random
 import subprocess
 import time
 
 import netdev
 from catalogue import add, kernel_test
-from gpio_sim import Edges
+from gpio_sim import Edges, GpioChip
 from kernel_rig import ESTOP_US, LEVEL_US, HighVcanRig, SlcanRig, TwoContactsRig, VcanRig, virtual
 from scenario import Skip
 from scenarios.estop import released_from_start
@@ -327,6 +328,34 @@ def row14_line_names(t):
     time.sleep(0.1)
     t.stopped_by(client, "estop_line")
     t.judge(rig)
+
+
+@kernel_test("a link to the line's chip, as on a Raspberry Pi 5: its name is one line; a second line with this name is refused", "estop", 14)
+def row14_linked_chip(t):
+    rig = t.rig()
+    link = f"/dev/gpiochip9{rig.chip.chip.removeprefix('gpiochip')}"
+    twin = None
+    os.symlink(rig.chip.chip, link)
+    try:
+        client = rig.connect_to_new()
+        t.check(client.request("status")["estop"]["state"] == "released", f"read next to the link: {rig.gateway.text()[-300:]}")
+        t.arm_and_drive(client, 200, 200, 0.4)
+        rig.press()
+        time.sleep(0.1)
+        t.stopped_by(client, "estop_line")
+        rig.release()
+        t.reset(client)
+        t.judge(rig)
+        client.close()
+        rig.gateway.end()
+        twin = GpioChip(f"twin{os.getpid()}", rig.line)
+        client = rig.connect_to_new(wheels=False)
+        t.check(client.request("status")["estop"]["state"] == "unreadable", "two chips have the name")
+    finally:
+        os.unlink(link)
+        if twin is not None:
+            rig.gateway.end()
+            twin.remove()
 
 
 @kernel_test("the button is untried until it was pressed and released; another name of its line makes it untried again", "estop", 13)

@@ -8,8 +8,9 @@
 #include <string.h>
 #include <unistd.h>
 
-/// Two chips with their lines; the line is on the second. The pointer to a chip is the pointer to its first line.
-static char lines[2][FAKE_GPIO_LINES];
+/// Two chips with their lines; the line is on the second. The third is the second again, opened through a link. The
+/// pointer to a chip is the pointer to its first line.
+static char lines[3][FAKE_GPIO_LINES];
 static unsigned iterated;
 
 static void *open_chip(unsigned chip) {
@@ -23,7 +24,8 @@ static void *open_chip(unsigned chip) {
 
 struct gpiod_chip *gpiod_chip_open_by_name(const char *name) {
     errno = ENOENT;
-    return (strcmp(name, FAKE_GPIO_CHIP) == 0) ? (struct gpiod_chip *)open_chip(1U) : NULL;
+    const unsigned chip = (strcmp(name, FAKE_GPIO_CHIP) == 0) ? 1U : (strcmp(name, FAKE_GPIO_LINK) == 0) ? 2U : 0U;
+    return (chip > 0U) ? (struct gpiod_chip *)open_chip(chip) : NULL;
 }
 
 void gpiod_chip_close(struct gpiod_chip *chip) {
@@ -45,7 +47,9 @@ struct gpiod_chip_iter *gpiod_chip_iter_new(void) {
 
 struct gpiod_chip *gpiod_chip_iter_next_noclose(struct gpiod_chip_iter *iter) {
     (void)iter;
-    return (iterated < 2U) ? (struct gpiod_chip *)open_chip(iterated++) : NULL;
+    static const unsigned orders[3][3] = {{0U, 1U, 0U}, {2U, 0U, 1U}, {0U, 1U, 2U}};
+    const unsigned chips = (fake_gpio.link == 0) ? 2U : 3U;
+    return (iterated < chips) ? (struct gpiod_chip *)open_chip(orders[fake_gpio.link][iterated++]) : NULL;
 }
 
 void gpiod_chip_iter_free_noclose(struct gpiod_chip_iter *iter) {
@@ -72,11 +76,11 @@ struct gpiod_chip *gpiod_line_get_chip(struct gpiod_line *line) {
 }
 
 const char *gpiod_chip_label(struct gpiod_chip *chip) {
-    return ((void *)chip == (void *)lines[1]) ? fake_gpio_label() : "another-chip";
+    return ((void *)chip != (void *)lines[0]) ? fake_gpio_label() : "another-chip";
 }
 
 const char *gpiod_chip_name(struct gpiod_chip *chip) {
-    return ((void *)chip == (void *)lines[1]) ? FAKE_GPIO_CHIP : "gpiochip0";
+    return ((void *)chip != (void *)lines[0]) ? FAKE_GPIO_CHIP : "gpiochip0";
 }
 
 unsigned gpiod_line_offset(struct gpiod_line *line) {
@@ -94,7 +98,7 @@ void gpiod_line_close_chip(struct gpiod_line *line) {
 }
 
 static int request_line(struct gpiod_line *line, int flags, bool both) {
-    fake_gpio.offset = (unsigned)((char *)(void *)line - &lines[1][0]);
+    fake_gpio.offset = gpiod_line_offset(line);
     fake_gpio.is_input = true;
     fake_gpio.both_edges = both;
     fake_gpio.buffer_size = 16U; // libgpiod 1 always uses this size.

@@ -9,6 +9,8 @@
 #include <unistd.h>
 
 static char one;
+/// The line's own chip, opened through its node and through the link, and the other chip.
+static char chips[3];
 static struct dirent entry;
 static unsigned listed;
 static unsigned allocated;
@@ -16,7 +18,7 @@ static unsigned wanted_size;
 static bool shown_own;
 static unsigned shown_offset;
 
-/// /dev has two chips; the line is on the second.
+/// /dev has two chips; the line is on the second. A link to that one may be next to it.
 DIR *opendir(const char *name) {
     (void)name;
     listed = 0;
@@ -24,8 +26,11 @@ DIR *opendir(const char *name) {
 }
 
 struct dirent *readdir(DIR *folder) {
-    static const char *const names[] = {"null", "gpiochip0", FAKE_GPIO_CHIP, "zero"};
+    static const char *const names[] = {"null", FAKE_GPIO_LINK, "gpiochip0", FAKE_GPIO_CHIP, FAKE_GPIO_LINK, "zero"};
     (void)folder;
+    if ((listed == 1U && fake_gpio.link != 1) || (listed == 4U && fake_gpio.link != 2)) {
+        listed++;
+    }
     if (listed == sizeof names / sizeof names[0]) {
         return NULL;
     }
@@ -38,10 +43,19 @@ int closedir(DIR *folder) {
     return 0;
 }
 
-static bool is_ours(const char *path) {
-    return strcmp(path, "/dev/" FAKE_GPIO_CHIP) == 0;
+static bool is_link(const char *path) {
+    return strcmp(path, "/dev/" FAKE_GPIO_LINK) == 0;
 }
 
+static bool is_ours(const char *path) {
+    return strcmp(path, "/dev/" FAKE_GPIO_CHIP) == 0 || is_link(path);
+}
+
+static bool is_own_chip(const void *chip) {
+    return chip == &chips[0] || chip == &chips[1];
+}
+
+/// The library follows links.
 bool gpiod_is_gpiochip_device(const char *path) {
     return is_ours(path) || strcmp(path, "/dev/gpiochip0") == 0;
 }
@@ -52,7 +66,7 @@ struct gpiod_chip *gpiod_chip_open(const char *path) {
         return NULL;
     }
     fake_gpio.open++;
-    return (struct gpiod_chip *)(is_ours(path) ? (void *)&one : (void *)&entry);
+    return (struct gpiod_chip *)(void *)&chips[is_link(path) ? 1 : is_ours(path) ? 0 : 2];
 }
 
 void gpiod_chip_close(struct gpiod_chip *chip) {
@@ -74,11 +88,11 @@ size_t gpiod_chip_info_get_num_lines(struct gpiod_chip_info *info) {
 }
 
 const char *gpiod_chip_info_get_label(struct gpiod_chip_info *info) {
-    return ((void *)info == (void *)&one) ? fake_gpio_label() : "another-chip";
+    return is_own_chip(info) ? fake_gpio_label() : "another-chip";
 }
 
 const char *gpiod_chip_info_get_name(struct gpiod_chip_info *info) {
-    return ((void *)info == (void *)&one) ? FAKE_GPIO_CHIP : "gpiochip0";
+    return is_own_chip(info) ? FAKE_GPIO_CHIP : "gpiochip0";
 }
 
 void gpiod_chip_info_free(struct gpiod_chip_info *info) {
@@ -87,7 +101,7 @@ void gpiod_chip_info_free(struct gpiod_chip_info *info) {
 
 struct gpiod_line_info *gpiod_chip_get_line_info(struct gpiod_chip *chip, unsigned offset) {
     allocated++;
-    shown_own = (void *)chip == (void *)&one;
+    shown_own = is_own_chip(chip);
     shown_offset = offset;
     return (struct gpiod_line_info *)(void *)&one;
 }
