@@ -113,8 +113,11 @@ static uid_t owner_listed(const char *name) {
 
 // Identity of a holder -----------------------------------------------------------------------------------------------
 
-/// Connects to the name and reads the holder's identity from the kernel, at the time when it began to listen. Returns
-/// false if there is none.
+/// One of the two ways to identify a holder. Returns false if no socket listens at the name.
+typedef bool (*ask_fn)(const char *name, gw_holder_t *out_holder);
+
+/// Connects to the name and reads the holder's identity from the kernel, at the time when it began to listen. A holder
+/// that accepts no connection is unknown. Never waits.
 static bool ask(const char *name, gw_holder_t *out_holder) {
     struct sockaddr_un address;
     struct ucred peer = {.uid = NO_USER};
@@ -126,14 +129,24 @@ static bool ask(const char *name, gw_holder_t *out_holder) {
     }
     const bool answers = connect(fd, (const struct sockaddr *)&address, length) == 0;
     const bool bound =
-        answers || errno != ECONNREFUSED; // The socket listens but accepts no connection, or is not a stream.
+        answers || errno != ECONNREFUSED; // The socket listens but accepts no connection: its queue is full.
     if (answers && getsockopt(fd, SOL_SOCKET, SO_PEERCRED, &peer, &size) != 0) {
         peer = (struct ucred){.uid = NO_USER};
     }
     (void)close(fd);
     if (bound) {
-        *out_holder = (gw_holder_t){.uid = answers ? peer.uid : owner_listed(name), .pid = answers ? peer.pid : 0};
+        *out_holder = (gw_holder_t){.uid = peer.uid, .pid = peer.pid};
         (void)snprintf(out_holder->name, sizeof out_holder->name, "%s", name);
+    }
+    return bound;
+}
+
+/// Searches the kernel's list for a holder that accepts no connection. Waits for LIST_US at most: only for a process
+/// that sends nothing.
+static bool ask_or_list(const char *name, gw_holder_t *out_holder) {
+    const bool bound = ask(name, out_holder);
+    if (bound && out_holder->uid == NO_USER) {
+        out_holder->uid = owner_listed(name);
     }
     return bound;
 }
@@ -166,7 +179,7 @@ static int take_place(gw_bus_names_t *self, gw_holder_t *out_stranger) {
             return error;
         }
         gw_holder_t holder;
-        if (!ask(name, &holder)) { // A socket that does not listen has the name.
+        if (!ask_or_list(name, &holder)) { // A socket that does not listen has the name.
             holder = (gw_holder_t){.uid = owner_listed(name)};
             (void)snprintf(holder.name, sizeof holder.name, "%s", name);
         }
@@ -185,12 +198,13 @@ static bool comes_first(const gw_bus_names_t *self, uid_t uid, unsigned place) {
     return place < self->place || (place == self->place && uid < self->owners.own);
 }
 
-static seen_t check_place(const gw_bus_names_t *self, uid_t uid, unsigned place, gw_holder_t *out_holder) {
+static seen_t check_place(const gw_bus_names_t *self, ask_fn identify, uid_t uid, unsigned place,
+                          gw_holder_t *out_holder) {
     char name[GW_BUS_NAME_SIZE];
     gw_holder_t holder;
     const bool ours = place == self->place && self->fd >= 0 && (place == 0U || uid == self->owners.own);
     name_of(self, uid, place, name);
-    if (ours || !ask(name, &holder)) {
+    if (ours || !identify(name, &holder)) {
         return SEEN_NONE;
     }
     if (holder.uid == NO_USER) {
@@ -204,12 +218,12 @@ static seen_t check_place(const gw_bus_names_t *self, uid_t uid, unsigned place,
 }
 
 /// Checks the places of all users who may run a gateway, and returns the most important result.
-static seen_t survey(const gw_bus_names_t *self, gw_holder_t *out_holder) {
+static seen_t survey(const gw_bus_names_t *self, ask_fn identify, gw_holder_t *out_holder) {
     const uid_t users[] = {0, self->owners.service, self->owners.own};
-    seen_t seen = check_place(self, self->owners.own, 0U, out_holder);
+    seen_t seen = check_place(self, identify, self->owners.own, 0U, out_holder);
     for (size_t i = 0; i < sizeof users / sizeof users[0]; i++) {
         for (unsigned place = 1; place < GW_BUS_PLACES && seen != SEEN_EARLIER; place++) {
-            const seen_t one = check_place(self, users[i], place, out_holder);
+            const seen_t one = check_place(self, identify, users[i], place, out_holder);
             if (one > seen) {
                 seen = one;
             }
@@ -225,10 +239,10 @@ int gw_bus_names_take(gw_bus_names_t *self, gw_holder_t *out_holder, gw_holder_t
         return error;
     }
     const iw_time_us_t until_us = iwl_clock_now_us() + GW_BUS_PATIENCE_US;
-    seen_t seen = survey(self, out_holder);
+    seen_t seen = survey(self, ask_or_list, out_holder);
     while (seen != SEEN_NONE && seen != SEEN_EARLIER && iwl_clock_now_us() < until_us) {
         (void)nanosleep(&again, NULL);
-        seen = survey(self, out_holder);
+        seen = survey(self, ask_or_list, out_holder);
     }
     if (seen == SEEN_EARLIER || seen == SEEN_LATER) {
         gw_bus_names_release(self);
@@ -246,7 +260,7 @@ bool gw_bus_names_poll(gw_bus_names_t *self, gw_holder_t *out_holder) {
         }
         (void)close(fd);
     }
-    const seen_t seen = first ? SEEN_NONE : survey(self, out_holder);
+    const seen_t seen = first ? SEEN_NONE : survey(self, ask, out_holder);
     return (seen == SEEN_EARLIER || seen == SEEN_LATER) && out_holder->uid != self->owners.own;
 }
 

@@ -37,11 +37,17 @@ typedef struct {
 } gw_bus_names_t;
 
 /// Acquires a name. Returns 0, EWOULDBLOCK if a process that may run a gateway serves this bus (`*out_holder`), or another
-/// errno. `*out_stranger` is a process that may not and has a name. It waits for GW_BUS_PATIENCE_US at most.
+/// errno. `*out_stranger` is a process that may not and has a name. Call it before anything is sent: it waits for
+/// GW_BUS_PATIENCE_US at most, and for up to 50 ms for each name whose holder accepts no connection, because foreign
+/// processes can make the kernel's list of sockets long.
 int gw_bus_names_take(gw_bus_names_t *self, gw_holder_t *out_holder, gw_holder_t *out_stranger);
 
 /// Answers processes that query this one's identity. Returns true and sets `*out_holder` if this process is neither
-/// root nor the service and one of these has connected: that one does not wait. A few system calls; never waits.
+/// root nor the service and one of these has a name: that one does not wait.
+///
+/// At most ten connections, and 64 that are answered; never waits and never reads the kernel's list. A holder whose queue
+/// of connections is full is unknown and changes nothing; a later call finds it. Until then each gateway detects the
+/// other one on the bus (cause `second_master`).
 bool gw_bus_names_poll(gw_bus_names_t *self, gw_holder_t *out_holder);
 
 void gw_bus_names_release(gw_bus_names_t *self);
