@@ -12,6 +12,7 @@
 #include <stddef.h>
 #include <string.h>
 #include <sys/file.h>
+#include <sys/random.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
@@ -51,8 +52,10 @@ static void assert_said_pid(pid_t pid) {
 /// Returns the name of an interface that no other run of this test uses.
 static const char *interface(void) {
     static char name[16];
-    if (name[0] == '\0') { // Before any process is created
-        (void)snprintf(name, sizeof name, "iwt%ld", (long)getpid());
+    if (name[0] == '\0') {   // Before any process is created
+        unsigned number = 0; // Two process namespaces with one network namespace have the same process ids.
+        TEST_ASSERT_EQUAL_INT(sizeof number, getrandom(&number, sizeof number, 0));
+        (void)snprintf(name, sizeof name, "iwt%x", number);
     }
     return name;
 }
