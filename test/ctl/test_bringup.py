@@ -413,6 +413,44 @@ class Bringup(unittest.TestCase):
         operator.expect("STOPPED: a key was pressed", 3)
         self.quit_at(operator, "Try again?")
 
+    # --- wheels turn only after an answer ----------------------------------------------------------------------------
+
+    def nonzero_since(self, begin_us):
+        return [frame for frame in self.moving() if frame[0] > begin_us]
+
+    def stop_among_types(self, stop, release=lambda: None):
+        """A stop while the first of three types is sent, and no repetition: the other types wait for an answer."""
+        self.rig.sim.ask("type 200")
+        operator = self.begin()
+        operator.answer("types to try", "1-3")
+        operator.expect("any key stops it")
+        until(self.moving, 5, "the wheels are commanded to turn")
+        stop(operator)
+        operator.expect("STOPPED")
+        release()
+        operator.expect("Try again?")
+        stopped_us = now_us()
+        operator.type("n\n")
+        operator.expect("types to try")
+        time.sleep(0.5)
+        hold(not self.nonzero_since(stopped_us), "setpoints of the next type after a stop, without an answer")
+        self.assertNotIn("None of these moved", operator.text)
+        operator.type("2\n")
+        operator.expect("None of these moved")
+        self.assertTrue(self.nonzero_since(stopped_us), "the answer tries the next type")
+        operator.expect("types to try")
+        operator.type("q\n")
+        self.leave(operator)
+
+    def test_key_among_types_returns_to_the_question(self):
+        self.stop_among_types(lambda operator: operator.type(" "))
+
+    def test_interrupt_among_types_returns_to_the_question(self):
+        self.stop_among_types(lambda operator: operator.type("\x03"))
+
+    def test_estop_among_types_returns_to_the_question(self):
+        self.stop_among_types(lambda _: self.rig.sim.ask("estop press"), lambda: self.rig.sim.ask("estop release"))
+
     def test_no_type_that_moves_asks_again_and_stores_none(self):
         self.rig.sim.ask("type 200")
         operator = self.begin()

@@ -29,6 +29,9 @@ typedef struct {
     recording_t recording;
 } study_t;
 
+/// Result of the try of one type. After a stop, the other types are tried only after a further answer.
+typedef enum { TRY_NEXT = 0, TRY_FOUND, TRY_STOPPED } try_t;
+
 static bool both_move(const outcome_t *outcome) {
     return abs(outcome->mean_mm_s[IW_LEFT]) >= MOVES_MM_S && abs(outcome->mean_mm_s[IW_RIGHT]) >= MOVES_MM_S;
 }
@@ -75,14 +78,14 @@ static void keep_type(bringup_t *self, int type, const outcome_t *outcome) {
     }
 }
 
-/// Tries one type. Returns true if both wheels turned and the operator saw it.
-static bool try_type(bringup_t *self, int type) {
+/// Tries one type. It is found if both wheels turned and the operator saw it.
+static try_t try_type(bringup_t *self, int type) {
     outcome_t outcome;
     const burst_t burst = bringup_ahead(self, BRINGUP_PROBE_MS);
     bringup_start_with(self, type);
     (void)printf("type %d:\n", type);
     if (!burst_show(self, &burst, &outcome)) {
-        return false;
+        return TRY_STOPPED;
     }
     if (!both_move(&outcome)) {
         const bool left = abs(outcome.mean_mm_s[IW_LEFT]) >= MOVES_MM_S;
@@ -90,13 +93,13 @@ static bool try_type(bringup_t *self, int type) {
             talk_print("  Only the %s wheel turned: is the other one blocked, or switched off?",
                        text_side(left ? IW_LEFT : IW_RIGHT));
         }
-        return false;
+        return TRY_NEXT;
     }
     const bool seen = talk_yes(self, "Did both wheels turn, slowly and evenly?", true);
     if (seen) {
         keep_type(self, type, &outcome);
     }
-    return seen;
+    return seen ? TRY_FOUND : TRY_NEXT;
 }
 
 /// Parses text such as "3", "0-7" or "1,4,9-12" into one flag per type. Returns false if it is not valid.
@@ -130,10 +133,15 @@ static bool parse_types(const char *text, bool wanted[TYPE_MAX + 1]) {
     }
 }
 
+/// Tries the types until one is found or stopped. Returns true if one is found.
 static bool try_types(bringup_t *self, const bool *wanted) {
     for (int type = 0; type <= TYPE_MAX; type++) {
-        if (wanted[type] && try_type(self, type)) {
-            return true;
+        const try_t tried = wanted[type] ? try_type(self, type) : TRY_NEXT;
+        if (tried == TRY_STOPPED) {
+            talk_print("Type %d was not tried to its end. Write the types to try next.", type);
+        }
+        if (tried != TRY_NEXT) {
+            return tried == TRY_FOUND;
         }
     }
     talk_print("None of these moved both wheels. Other types may; or the wheels need more current (--current, now "
