@@ -190,9 +190,12 @@ class Bringup(unittest.TestCase):
         operator.answer("Point the machine at the mark", "")
         self.move_and_enter(operator, *(commands or (f"turn {turns}",)))
 
-    def find_type(self, operator, types="1"):
+    def find_type(self, operator, types="1", tries=True):
+        """To the question about the role, or to its tries."""
         operator.answer("types to try", types)
         operator.answer("Did both wheels turn", "y")
+        if tries:
+            operator.answer("Enter begins the tries", "")
 
     def drive_through(self, operator, signs=True):
         """Type, role and signs of wheels as documented."""
@@ -326,6 +329,7 @@ class Bringup(unittest.TestCase):
         operator = self.begin()
         operator.answer("types to try", "7")
         self.answer_after("block both", operator, "Did both wheels turn", "y")
+        operator.answer("Enter begins the tries", "")
         return operator
 
     def test_wheel_blocked_in_current_test_is_found_by_turning_zero(self):
@@ -450,6 +454,50 @@ class Bringup(unittest.TestCase):
 
     def test_estop_among_types_returns_to_the_question(self):
         self.stop_among_types(lambda _: self.rig.sim.ask("estop press"), lambda: self.rig.sim.ask("estop release"))
+
+    def test_estop_between_types_needs_an_answer(self):
+        self.rig.sim.ask("type 200")
+        operator = self.begin()
+        operator.answer("types to try", "1-2")
+        operator.expect("measured")  # The gateway of the first type holds its zeros, and ends.
+        measured_us = now_us()
+        self.rig.sim.ask("estop press")
+        time.sleep(0.1)
+        self.rig.sim.ask("estop release")
+        operator.expect("did not start: the e-stop was pressed after your last answer", 10)
+        hold(not self.nonzero_since(measured_us), "setpoints after the e-stop, without an answer")
+        operator.answer("Try again?", "y")
+        operator.expect("measured")
+        self.assertTrue(self.nonzero_since(measured_us), "the answer turns the wheels")
+        self.quit_at(operator, "types to try")
+
+    def test_estop_pressed_at_the_answer_is_reported(self):
+        operator = self.begin(to="signs")
+        self.answer_after("estop press", operator, "Watch the left wheel", "")
+        answered_us = now_us()
+        time.sleep(1)
+        self.rig.sim.ask("estop release")
+        operator.expect("did not start: the e-stop is pressed")
+        operator.expect("Try again?")
+        time.sleep(1)
+        hold(not self.nonzero_since(answered_us), "the release of the e-stop turns a wheel")
+        operator.type("y\n")
+        operator.expect("measured")
+        self.assertTrue(self.nonzero_since(answered_us), "the answer after the release turns the wheel")
+        self.quit_at(operator, "r: repeat)")
+
+    def test_estop_pressed_and_released_before_the_answer_is_reset(self):
+        operator = self.begin(to="signs")
+        self.simulate_after(operator, "Watch the left wheel", "estop press")
+        time.sleep(0.2)
+        self.rig.sim.ask("estop release")
+        pressed_us = now_us()
+        time.sleep(1)
+        hold(not self.nonzero_since(pressed_us), "the release of the e-stop turns a wheel")
+        operator.type("\n")
+        operator.expect("measured")
+        self.assertTrue(self.nonzero_since(pressed_us), "the answer turns the wheel")
+        self.quit_at(operator, "r: repeat)")
 
     def test_no_type_that_moves_asks_again_and_stores_none(self):
         self.rig.sim.ask("type 200")
@@ -586,9 +634,10 @@ class Bringup(unittest.TestCase):
     def test_type_that_turns_at_another_speed_is_not_confirmed(self):
         for command in ("gear both 2", "rpm both rotor"):
             self.rig.sim.ask(command)
-        operator = self.begin(to="role")
+        operator = self.begin()
+        self.find_type(operator, tries=False)
         operator.expect("notes it as not confirmed")
-        self.quit_at(operator, "current_role")
+        self.quit_at(operator, "Enter begins the tries")
 
     def test_type_that_turns_one_wheel_only_is_not_accepted(self):
         self.rig.sim.ask("block right")
@@ -602,6 +651,7 @@ class Bringup(unittest.TestCase):
         operator = self.begin()
         operator.answer("types to try", "1")
         self.answer_after("block both", operator, "Did both wheels turn", "y")
+        operator.answer("Enter begins the tries", "")
         operator.expect("the result counts only if both wheels turn")
         self.simulate_after(operator, "Now no wheel turned", "unblock both")
         self.assertEqual("?", self.offered(operator, "current_role"))
@@ -615,6 +665,7 @@ class Bringup(unittest.TestCase):
         operator = self.begin()
         operator.answer("types to try", "1")
         self.answer_after("block right", operator, "Did both wheels turn", "y")
+        operator.answer("Enter begins the tries", "")
         operator.expect("The current alone turned the left wheel")
         self.simulate_after(operator, "only one wheel showed it", "unblock right")
         operator.answer("current_role", "")
@@ -744,11 +795,13 @@ class Bringup(unittest.TestCase):
     def test_disturbed_step_is_repeated_by_enter(self):
         operator = self.begin()
         operator.answer("types to try", "1")
-        self.answer_after("estop press", operator, "Did both wheels turn", "y")
+        operator.answer("Did both wheels turn", "y")
+        self.answer_after("estop press", operator, "Enter begins the tries", "")
         operator.answer("Try again?", "n")
         moved = len(self.moving())
         self.answer_after("estop release", operator, "Do it again?", "")
         operator.expect("Step 5 of 10")
+        operator.answer("Enter begins the tries", "")
         operator.answer("current_role", "")
         self.assertGreater(len(self.moving()), moved)
         self.look_at_signs_only(operator)
@@ -784,6 +837,19 @@ class Bringup(unittest.TestCase):
         for key in ("setpoint_type", "current_role", "invert"):
             self.assertTrue(found[key].startswith("confirmed: "), found)
         self.assertNotIn("BRINGUP SAVED", self.written())
+
+    def test_saved_type_alone_turns_no_wheel_after_the_release(self):
+        operator = self.begin()
+        self.find_type(operator, tries=False)
+        operator.answer("Enter begins the tries", "q")
+        operator.answer("Save the 1 confirmed results", "")
+        self.assertEqual(1, operator.wait())
+        begin_us = now_us()
+        operator = self.go_on(self.out + ".part", same="y")
+        operator.expect("Step 5 of 10")
+        time.sleep(1.5)
+        hold(not self.nonzero_since(begin_us), "the release of the e-stop turns a wheel")
+        self.quit_at(operator, "Enter begins the tries")
 
     def test_saved_results_of_other_wheels_do_not_count(self):
         operator = self.go_on(self.save(), same="n")

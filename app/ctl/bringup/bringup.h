@@ -52,6 +52,8 @@ typedef struct {
     int current_mA;
     double mm_per_tick; ///< From a pushed distance; 0: not known.
     trial_t trial;
+    int64_t known_us;  ///< Stops until this time are known: the operator answered later, or the stop is a result.
+    int64_t estop_us;  ///< Time of the last e-stop of the trial gateways that ended; 0: none.
     jmp_buf disturbed; ///< Begin of the present step.
     bool repeats;      ///< The present step can be repeated: bringup_fail offers it.
     bool ending;       ///< The last question is being asked.
@@ -152,14 +154,25 @@ void trial_stop(bringup_t *self);
 void trial_close(bringup_t *self);
 /// Returns a new reference to the status of the trial gateway, or NULL.
 json_t *trial_status(bringup_t *self);
-/// Waits until both wheels are online and at standstill and no e-stop is pressed. Returns false after it has printed
-/// the reason if that does not happen; with `key_ends` also, without a message, when a key is pressed.
-bool trial_wait_ready(bringup_t *self, bool key_ends);
 /// Runs the burst, reports it to the operator before and after, and offers to repeat it after a failure. Returns false
 /// if the burst was not done and the operator wants no repetition.
 bool burst_show(bringup_t *self, const burst_t *burst, outcome_t *out_outcome);
 /// Runs the burst as burst_show does, but ends bringup if it was not done.
 void burst_insist(bringup_t *self, const burst_t *burst, outcome_t *out_outcome);
+
+// --- conditions (bringup_ready.c) ---------------------------------------------------------------------------------
+
+/// Waits until both wheels are online and at standstill and the gateway is listening. Returns false after it has
+/// written the reason if that does not happen, or a key is pressed. An e-stop that is not released ends the wait
+/// immediately, and so does a stop that is later than the operator's last answer: only an answer leads to a movement.
+/// Resets an earlier latch.
+bool ready_to_move(bringup_t *self, char *out_why, size_t size);
+/// Waits until both wheels are online and at standstill and the e-stop is released, before hands move them. Resets
+/// nothing. Ends bringup after it has printed the reason if that does not happen.
+void ready_by_hand(bringup_t *self);
+/// Waits until the trial gateway sends no zeros any more, and stores the time of its last e-stop: the next trial gateway
+/// does not know it.
+void ready_retain_estop(bringup_t *self);
 
 // --- by hand (bringup_hand.c, bringup_sum.c) ----------------------------------------------------------------------
 

@@ -190,6 +190,7 @@ static burst_end_t judge(run_t *run, burst_end_t end) {
                       strcmp(text_word(why, "cause"), "client_stop") == 0;
     if ((end == BURST_DONE || end == BURST_STOPPED) && (ran_away(run, why) || diverged(run, why))) {
         end = BURST_DONE;
+        run->bringup->known_us = json_integer_value(json_object_get(why, "at_us"));
     } else if (end == BURST_STOPPED || (end == BURST_DONE && !ours)) {
         end = fail(run, BURST_STOPPED, text_word(why, "sentence"));
     } else if (end == BURST_DONE && run->unknown > 0) {
@@ -245,52 +246,47 @@ static burst_end_t stop(run_t *run, burst_end_t end) {
     return end;
 }
 
-/// Arms, and returns the reply; NULL if the wheels are not ready. It tries again because a wheel with late telemetry
-/// counts as not at standstill for a moment longer.
-static json_t *arm(bringup_t *self) {
-    json_t *armed = NULL;
-    for (unsigned tries = 0; tries < ARM_TRIES; tries++) {
-        json_decref(armed);
-        armed = near_ask(self->ctl, json_pack("{s:s,s:s}", "cmd", "arm", "name", "bringup"));
-        if (strcmp(text_word(armed, "error"), "not_at_rest") != 0) {
-            break;
-        }
-        if (!trial_wait_ready(self, true)) {
-            json_decref(armed);
-            return NULL;
-        }
-    }
-    return armed;
+/// Ends the burst before the first command, for the reason in the outcome unless the operator ended it.
+static burst_end_t refuse(run_t *run) {
+    const char *why = ended_by_operator(run);
+    return (why != NULL) ? fail(run, BURST_REFUSED, why) : BURST_REFUSED;
 }
 
-/// Ends the burst before the first command. `reply` is the gateway's refusal; NULL: there is none.
-static burst_end_t refuse(run_t *run, const json_t *reply) {
-    const char *why = ended_by_operator(run);
-    if (why == NULL) {
-        why = (reply != NULL) ? text_word(reply, "message") : "the wheels are not ready";
+/// Waits until the wheels are ready, and arms. It tries again because a wheel with late telemetry counts as not at
+/// standstill for a moment longer.
+static burst_end_t arm(run_t *run) {
+    bringup_t *self = run->bringup;
+    outcome_t *outcome = run->outcome;
+    bool waits = true;
+    for (unsigned tries = 0; tries < ARM_TRIES && waits; tries++) {
+        if (!ready_to_move(self, outcome->why, sizeof outcome->why)) {
+            break;
+        }
+        json_t *why = near_ask(self->ctl, json_pack("{s:s}", "cmd", "why"));
+        run->stops = json_integer_value(json_object_get(why, "number"));
+        json_decref(why);
+        json_decref(
+            near_ask(self->ctl, json_pack("{s:s,s:[s],s:i}", "cmd", "watch", "topics", "state", "rate_hz", 50)));
+        json_t *armed = near_ask(self->ctl, json_pack("{s:s,s:s}", "cmd", "arm", "name", "bringup"));
+        const bool ok = json_is_true(json_object_get(armed, "ok"));
+        waits = strcmp(text_word(armed, "error"), "not_at_rest") == 0;
+        (void)snprintf(outcome->why, sizeof outcome->why, "%s", text_word(armed, "message"));
+        json_decref(armed);
+        if (ok) {
+            return BURST_DONE;
+        }
     }
-    return fail(run, BURST_REFUSED, why);
+    return refuse(run);
 }
 
 /// Arms, drives, stops and waits until both are at standstill. Any key stops immediately.
 static void burst_run(bringup_t *self, const burst_t *burst, outcome_t *out_outcome) {
     run_t run = {.bringup = self, .burst = burst, .outcome = out_outcome};
     memset(out_outcome, 0, sizeof(*out_outcome));
-    if (!trial_wait_ready(self, true)) {
-        out_outcome->end = refuse(&run, NULL);
+    out_outcome->end = arm(&run);
+    if (out_outcome->end != BURST_DONE) {
         return;
     }
-    json_t *why = near_ask(self->ctl, json_pack("{s:s}", "cmd", "why"));
-    run.stops = json_integer_value(json_object_get(why, "number"));
-    json_decref(why);
-    json_decref(near_ask(self->ctl, json_pack("{s:s,s:[s],s:i}", "cmd", "watch", "topics", "state", "rate_hz", 50)));
-    json_t *armed = arm(self);
-    if (!json_is_true(json_object_get(armed, "ok"))) {
-        out_outcome->end = refuse(&run, armed);
-        json_decref(armed);
-        return;
-    }
-    json_decref(armed);
     run.begin_us = client_now_us();
     run.received_us = run.begin_us;
     run.end_us = run.begin_us + (int64_t)burst->for_ms * 1000;

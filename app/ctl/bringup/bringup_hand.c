@@ -60,9 +60,7 @@ static bool wait_for_line(bringup_t *self, hand_t *hand) {
 
 void hand_follow(bringup_t *self, const char *prompt, hand_t *out_hand) {
     char line[16] = "";
-    if (!trial_wait_ready(self, false)) {
-        bringup_fail(self);
-    }
+    ready_by_hand(self);
     const hand_sample_t first = read_first(self);
     hand_begin(out_hand, &first, client_now_us());
     talk_forget();

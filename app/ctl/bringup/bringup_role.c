@@ -134,6 +134,7 @@ static void keep_role(bringup_t *self, const role_t *found) {
 }
 
 void bringup_role(bringup_t *self) {
+    char answer[BRINGUP_ANSWER_SIZE];
     role_t found = {.role = "?"};
     talk_step(5, "the role of the current (WHEELS MAY TURN, in the air)");
     talk_print(
@@ -142,6 +143,7 @@ void bringup_role(bringup_t *self) {
         "current.",
         self->current_mA / 2, BRINGUP_SPEED_MM_S);
     bringup_start_with(self, self->config.core.setpoint_type);
+    talk_ask(self, "Enter begins the tries", "go", answer);
     find_role(self, &found);
     keep_role(self, &found);
 }

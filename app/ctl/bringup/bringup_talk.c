@@ -87,6 +87,7 @@ void talk_ask(bringup_t *self, const char *question, const char *otherwise, char
         (void)puts("");
         bringup_abandon(self);
     }
+    self->known_us = client_now_us();
     trim(out_answer);
     if (out_answer[0] == '\0') {
         (void)snprintf(out_answer, BRINGUP_ANSWER_SIZE, "%s", otherwise);

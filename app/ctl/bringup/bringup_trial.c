@@ -17,7 +17,6 @@
 #include <unistd.h>
 
 #define START_US 5000000
-#define READY_US 8000000
 #define END_US   4000000
 #define POLL_NS  20000000L
 
@@ -259,11 +258,13 @@ bool trial_start_with_records(bringup_t *self) {
 }
 
 void trial_stop(bringup_t *self) {
-    const int64_t end_us = client_now_us() + END_US;
-    client_close(&self->ctl->client);
     if (self->trial.pid <= 0) {
+        client_close(&self->ctl->client);
         return;
     }
+    ready_retain_estop(self);
+    client_close(&self->ctl->client);
+    const int64_t end_us = client_now_us() + END_US;
     (void)kill(self->trial.pid, SIGTERM);
     while (waitpid(self->trial.pid, NULL, WNOHANG) == 0) {
         if (client_now_us() > end_us) {
@@ -292,54 +293,4 @@ void trial_close(bringup_t *self) {
 
 json_t *trial_status(bringup_t *self) {
     return near_ask(self->ctl, json_pack("{s:s}", "cmd", "status"));
-}
-
-/// Returns NULL if the wheels can be armed as far as the status shows, otherwise the missing condition.
-static const char *missing(const json_t *status) {
-    const json_t *left = json_object_get(status, "left");
-    const json_t *right = json_object_get(status, "right");
-    const char *estop = text_word(json_object_get(status, "estop"), "state");
-    if (status == NULL) {
-        return "the gateway of this session does not answer";
-    }
-    if (!json_is_true(json_object_get(left, "heard")) || !json_is_true(json_object_get(right, "heard"))) {
-        return !json_is_true(json_object_get(left, "heard")) ? "the left wheel is offline (power, cable)"
-                                                             : "the right wheel is offline (power, cable)";
-    }
-    if (!json_is_true(json_object_get(left, "at_rest")) || !json_is_true(json_object_get(right, "at_rest"))) {
-        return "a wheel turns";
-    }
-    if (strcmp(estop, "released") != 0 && strcmp(estop, "none") != 0) {
-        return "the e-stop is pressed or cannot be read";
-    }
-    if (json_array_size(json_object_get(status, "present")) > 0) {
-        return "a recent fault is still present";
-    }
-    return (strcmp(text_word(status, "state"), "listening") == 0) ? NULL : "the gateway does not return to listening";
-}
-
-bool trial_wait_ready(bringup_t *self, bool key_ends) {
-    const int64_t end_us = client_now_us() + READY_US;
-    const unsigned signals = signals_count();
-    while (!key_ends || !talk_key_pressed()) {
-        json_t *status = trial_status(self);
-        const char *what = missing(status);
-        const bool latched = strcmp(text_word(status, "state"), "latched") == 0;
-        const bool lost = status == NULL;
-        json_decref(status);
-        if (what == NULL) {
-            return true;
-        }
-        if (latched) {
-            json_decref(near_ask(self->ctl, json_pack("{s:s}", "cmd", "reset"))); // Refused until the cause is gone.
-        }
-        if (client_now_us() > end_us || lost) {
-            if (signals_count() == signals) {
-                talk_print("  Not ready: %s.", what);
-            }
-            return false;
-        }
-        nap();
-    }
-    return false;
 }
