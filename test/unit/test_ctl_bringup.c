@@ -9,6 +9,7 @@
 
 #define ANSWERED_US 5000000
 #define STEPS       8U
+#define POLL_US     20000
 
 /// One answer of the gateway to `status`. The last one repeats.
 typedef struct {
@@ -25,11 +26,14 @@ void __wrap_trial_start(bringup_t *self, const gateway_config_t *config);
 bool __wrap_burst_show(bringup_t *self, const burst_t *burst, outcome_t *out_outcome);
 void __wrap_burst_insist(bringup_t *self, const burst_t *burst, outcome_t *out_outcome);
 json_t *__wrap_near_ask(ctl_t *ctl, json_t *request);
+int64_t __wrap_client_now_us(void);
 
 static bringup_t bringup;
 static ctl_t ctl;
 static view_t views[STEPS];
 static unsigned polls;
+static unsigned offline_polls; ///< So many answers without the left wheel.
+static int64_t now_us;
 static const char *cause;
 static int64_t stop_us;
 static bool resets_work;
@@ -93,8 +97,12 @@ void __wrap_burst_insist(bringup_t *self, const burst_t *burst, outcome_t *out_o
     (void)__wrap_burst_show(self, burst, out_outcome);
 }
 
-static json_t *wheel(bool turns) {
-    return json_pack("{s:b,s:b}", "heard", 1, "at_rest", !turns);
+int64_t __wrap_client_now_us(void) {
+    return now_us;
+}
+
+static json_t *wheel(bool online, bool turns) {
+    return json_pack("{s:b,s:b}", "heard", online, "at_rest", online && !turns);
 }
 
 json_t *__wrap_near_ask(ctl_t *ctl_, json_t *request) {
@@ -107,8 +115,9 @@ json_t *__wrap_near_ask(ctl_t *ctl_, json_t *request) {
             i--;
         }
         polls++;
+        now_us += POLL_US;
         reply = json_pack("{s:s,s:{s:s},s:o,s:o,s:[]}", "state", views[i].state, "estop", "state", views[i].estop,
-                          "left", wheel(views[i].turns), "right", wheel(false), "present");
+                          "left", wheel(polls > offline_polls, views[i].turns), "right", wheel(true, false), "present");
     } else if (strcmp(cmd, "why") == 0) {
         reply = json_pack("{s:i,s:s,s:I,s:s}", "number", (cause != NULL) ? 7 : 0, "cause",
                           (cause != NULL) ? cause : "none", "at_us", (json_int_t)stop_us, "sentence", "the sentence");
@@ -133,7 +142,8 @@ void setUp(void) {
     bringup.ctl = &ctl;
     bringup.known_us = ANSWERED_US;
     views[0] = (view_t){.state = "listening", .estop = "released"};
-    polls = resets = questions = 0;
+    polls = resets = questions = offline_polls = 0;
+    now_us = ANSWERED_US;
     cause = NULL;
     stop_us = reset_stop = 0;
     resets_work = true;
@@ -203,6 +213,23 @@ TEST(test_move_after_an_earlier_stop_resets_that_stop) {
     TEST_ASSERT_TRUE(ready_to_move(&bringup, why, sizeof why));
     TEST_ASSERT_EQUAL_UINT(1, resets);
     TEST_ASSERT_EQUAL_INT64(7, reset_stop);
+}
+
+/// The release of an e-stop may switch a wheel on.
+TEST(test_move_of_a_wheel_that_was_offline_is_refused) {
+    offline_polls = 30;
+    refused("the left wheel is offline (power, cable)");
+    TEST_ASSERT_LESS_THAN(offline_polls, polls);
+}
+
+TEST(test_move_waits_until_a_new_gateway_receives_the_wheels) {
+    offline_polls = 10;
+    TEST_ASSERT_TRUE(ready_to_move(&bringup, why, sizeof why));
+}
+
+TEST(test_move_with_a_wheel_that_turns_on_is_refused) {
+    views[0].turns = true;
+    refused("a wheel turns");
 }
 
 TEST(test_move_after_a_key_is_refused) {

@@ -164,7 +164,8 @@ void burst_insist(bringup_t *self, const burst_t *burst, outcome_t *out_outcome)
 
 /// Waits until both wheels are online and at standstill and the gateway is listening. Returns false after it has
 /// written the reason if that does not happen, or a key is pressed. An e-stop that is not released ends the wait
-/// immediately, and so does a stop that is later than the operator's last answer: only an answer leads to a movement.
+/// immediately, and so do a wheel that is offline for half a second and a stop that is later than the operator's last
+/// answer: only an answer leads to a movement.
 /// Resets an earlier latch.
 bool ready_to_move(bringup_t *self, char *out_why, size_t size);
 /// Waits until both wheels are online and at standstill and the e-stop is released, before hands move them. Resets

@@ -8,6 +8,9 @@
 #include <time.h>
 
 #define READY_US 8000000
+/// A new gateway receives both wheels within this time. A wheel that comes online later was switched on, perhaps by the
+/// release of an e-stop that cuts its power: it must not turn.
+#define OFFLINE_US 500000
 /// Longest time for which a trial gateway sends zeros after a stop, with a margin.
 #define ZEROS_US 3000000
 #define POLL_NS  20000000L
@@ -37,6 +40,16 @@ static const char *estop_prevents(const json_t *status) {
                : "the e-stop cannot be read; check its wire before you answer";
 }
 
+/// Returns the name of an offline wheel with the likely causes, or NULL.
+static const char *offline_wheel(const json_t *status) {
+    if (!json_is_true(json_object_get(json_object_get(status, "left"), "heard"))) {
+        return "the left wheel is offline (power, cable)";
+    }
+    return json_is_true(json_object_get(json_object_get(status, "right"), "heard"))
+               ? NULL
+               : "the right wheel is offline (power, cable)";
+}
+
 /// Returns NULL if the e-stop is released, both wheels are online and at standstill and no cause of a stop is present,
 /// otherwise the missing condition.
 static const char *missing(const json_t *status) {
@@ -46,9 +59,8 @@ static const char *missing(const json_t *status) {
     if (status == NULL || estop != NULL) {
         return (estop != NULL) ? estop : "the gateway of this session does not answer";
     }
-    if (!json_is_true(json_object_get(left, "heard")) || !json_is_true(json_object_get(right, "heard"))) {
-        return !json_is_true(json_object_get(left, "heard")) ? "the left wheel is offline (power, cable)"
-                                                             : "the right wheel is offline (power, cable)";
+    if (offline_wheel(status) != NULL) {
+        return offline_wheel(status);
     }
     if (!json_is_true(json_object_get(left, "at_rest")) || !json_is_true(json_object_get(right, "at_rest"))) {
         return "a wheel turns";
@@ -82,6 +94,7 @@ static bool reset(bringup_t *self, char *out_why, size_t size) {
 
 bool ready_to_move(bringup_t *self, char *out_why, size_t size) {
     const int64_t end_us = client_now_us() + READY_US;
+    int64_t online_us = client_now_us(); // Last time when both wheels were online.
     bool waits = true;
     if (self->estop_us > self->known_us) {
         (void)snprintf(out_why, size, "%s", UNKNOWN_ESTOP);
@@ -92,7 +105,11 @@ bool ready_to_move(bringup_t *self, char *out_why, size_t size) {
         const char *what = missing(status);
         const bool latched = is_in(status, "latched");
         const bool listening = is_in(status, "listening");
-        waits = status != NULL && estop_prevents(status) == NULL && client_now_us() <= end_us;
+        if (offline_wheel(status) == NULL) {
+            online_us = client_now_us();
+        }
+        waits = status != NULL && estop_prevents(status) == NULL && client_now_us() - online_us <= OFFLINE_US &&
+                client_now_us() <= end_us;
         json_decref(status);
         if (what == NULL && listening) {
             return true;
