@@ -113,12 +113,13 @@ static size_t write_quoted(relay_t *self, const serial_request_t *request, size_
 }
 
 /// Returns the reason why a request from that time is no longer sent; NULL if it is sent.
-static const char *too_late(const relay_t *self, const relay_channel_t *channel, serial_kind_t kind, uint64_t came_us) {
+static const char *too_late(const relay_t *self, const relay_channel_t *channel, const sock_client_t *client,
+                            serial_kind_t kind, uint64_t came_us) {
     if (kind != SERIAL_MOVES && kind != SERIAL_GRANTS) {
         return NULL;
     }
-    if (channel->ahead > 0U) {
-        return "a stop of this client came before this request was sent to the board; send it again";
+    if (channel->ahead > 0U || (kind == SERIAL_GRANTS && sock_client_waited_through_stop(client))) {
+        return SERIAL_OVERTAKEN;
     }
     if (came_us < self->gap_us) {
         return "the relay was delayed while this request waited, so it was not sent; send it again";
@@ -132,11 +133,13 @@ static const char *too_late(const relay_t *self, const relay_channel_t *channel,
     return NULL;
 }
 
-static void forward(relay_t *self, relay_channel_t *channel, const iwn_request_t *asked, iwn_json_t root,
-                    uint64_t came_us) {
+static void forward(relay_t *self, relay_channel_t *channel, const sock_client_t *client, const iwn_request_t *asked,
+                    iwn_json_t root) {
+    const uint64_t since_us = (self->gap_us > channel->armed_us) ? self->gap_us : channel->armed_us;
+    const uint64_t came_us = sock_client_sent_us(client, self->now_us, since_us);
     serial_request_t *place = serial_queue_place(&channel->queue);
     *place = (serial_request_t){.kind = serial_kind_of(asked->cmd), .id = asked->id, .came_us = came_us};
-    const char *late = too_late(self, channel, place->kind, came_us);
+    const char *late = too_late(self, channel, client, place->kind, came_us);
     if (late != NULL) {
         answer_here(channel, &asked->id, IWN_STALE_COMMAND, late);
         return;
@@ -185,8 +188,7 @@ static void carry_out(void *context, sock_client_t *client, const char *line, si
             "this socket is for watching; to drive connect to [northbound] socket of iwheel-serial, as a member "
             "of its group");
     } else {
-        const uint64_t since_us = (self->gap_us > channel->armed_us) ? self->gap_us : channel->armed_us;
-        forward(self, channel, &request, iwn_json_root(line), sock_client_sent_us(client, self->now_us, since_us));
+        forward(self, channel, client, &request, iwn_json_root(line));
     }
     client->held = serial_queue_is_full(&channel->queue); // The next line stays in the socket.
 }

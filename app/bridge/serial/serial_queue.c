@@ -52,8 +52,7 @@ void serial_queue_overtake(serial_queue_t *self, serial_kind_t newer) {
                    "a newer command of this client replaced this one before the serial line was free; send no faster "
                    "than the replies come");
         } else if (newer == SERIAL_STOPS && (request->kind == SERIAL_MOVES || request->kind == SERIAL_GRANTS)) {
-            refuse(request, IWN_STALE_COMMAND,
-                   "a stop of this client came before this request was sent to the board; send it again");
+            refuse(request, IWN_STALE_COMMAND, SERIAL_OVERTAKEN);
         }
     }
 }

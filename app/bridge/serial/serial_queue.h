@@ -10,7 +10,7 @@
 ///   most one without answer and one that waits. A `drive` whose answer takes longer than `hold_us` delays no other
 ///   request, because its answer may be lost. The answer to a later request proves that, and frees its place.
 /// - A stop is not sent from here, and waits for no request: its place in the queue is that of its reply. Waiting
-///   requests before it that could move are refused.
+///   requests before it that could move are refused, in the queues of all clients.
 /// - A `drive` that waited for SERIAL_FRESH_US is refused here. The board judges a request on the line by its quote.
 /// - No request is repeated.
 ///
@@ -30,6 +30,9 @@
 /// After this time the board has lost a request, or the relay its answer: `arm` may need `echo_ms`.
 #define SERIAL_PATIENCE_US      3000000U
 #define SERIAL_MOVE_PATIENCE_US 1000000U ///< The same for a `drive`.
+/// Reply to a request from before a stop.
+#define SERIAL_OVERTAKEN                                                                                               \
+    "the wheels were stopped before this request was sent to the board; see why (iwheelctl why), then send it again"
 /// Reply to a request that the board did not answer.
 #define SERIAL_NO_REPLY "the board did not answer: this request or its reply was lost on the serial line; send it again"
 /// Size of a request on the line, without channel and CRC.

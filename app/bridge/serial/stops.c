@@ -91,11 +91,20 @@ static void refuse_stop(relay_t *self, relay_stop_t *stop, iwn_error_t error, co
     }
 }
 
+/// A request of any client that came before a stop must not move the wheels after it.
+static void overtake(relay_t *self, const sock_client_t *stopper) {
+    sock_clients_note_stop(&self->clients, stopper); // For the requests in the sockets.
+    for (unsigned i = 1; i <= IWN_LINE_CHANNELS; i++) {
+        serial_queue_overtake(&self->channel[i].queue, SERIAL_STOPS);
+    }
+}
+
 /// Stores a stop for the board. Returns its place, or that of an equal one that waits.
 static relay_stop_t *put(relay_t *self, sock_client_t *client, const iwn_request_t *asked) {
     const bool latches = asked->cmd == IWN_CMD_ESTOP;
     const relay_channel_t *channel = relay_channel_of(self, client);
     relay_stop_t *stop = equal_stop(self, client->id, latches);
+    overtake(self, client);
     if (stop != NULL) {
         return stop;
     }
@@ -186,7 +195,6 @@ void relay_stops_read_ahead(relay_t *self, relay_channel_t *channel, sock_client
             ++stops > channel->ahead) {
             channel->ahead = stops;
             put(self, client, &request)->ahead = true;
-            serial_queue_overtake(&channel->queue, SERIAL_STOPS);
         }
     }
 }
