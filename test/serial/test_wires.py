@@ -135,6 +135,51 @@ def bad_stop(t):
     stop_well(t, rig, client)
 
 
+def refuse_older_release(t, stop):
+    """A client requests the end of the hold. While that request waits behind another one, `stop` stops the wheels: the hold continues."""
+    rig, client = t.running({"drive": {"after_stop": "hold"}})
+    other = rig.client()
+    t.check(other.wait_event("hello"), "the other client is welcomed")
+    t.arm_and_drive(client, 200, 200, 0.4)
+    t.expect(client.request("stop"))
+    t.check(rig.wait_status(client, lambda s: s["holding"] and s["left"]["at_rest"] and s["right"]["at_rest"], 6), "the zeros are held at standstill")
+    rig.cable.held = True
+    time.sleep(0.03)  # The cable has delivered the bytes that it held.
+    client.send_raw(b'{"cmd":"status","id":901}\n{"cmd":"release","id":902}\n')
+    time.sleep(0.1)
+    stop(rig, other)
+    time.sleep(0.05)
+    rig.cable.held = False
+    replies = {reply["id"]: reply for reply in read_replies(client, 2)}
+    time.sleep(0.1)
+    begin_us = now_us()
+    time.sleep(0.4)
+    t.rule(len(rig.bus.setpoints(begin_us)) > 20, f"the zeros of the hold continue: {replies.get(902)}")
+    t.check(replies[901]["ok"] and replies[902].get("error") == "stale_command", f"{replies[902]}")
+    t.reset(client)
+    t.expect(client.request("release"))
+    t.silence(rig, client)
+
+
+@scenario("a release that waits while another client presses the e-stop is not executed: the hold continues", 9)
+def release_before_estop(t):
+    def estop(rig, other):
+        rig.note("estop", done_us=now_us() + 300_000)
+        other.send_raw(b'{"cmd":"estop","id":1}\n')
+
+    refuse_older_release(t, estop)
+
+
+@scenario("a release that waits while the e-stop of the board is pressed is not executed: the hold continues", 9)
+def release_before_press(t):
+    def press(rig, _):
+        rig.press()
+        time.sleep(0.03)
+        rig.release()
+
+    refuse_older_release(t, press)
+
+
 @scenario("a client that is killed while it drives loses its lease immediately", 3)
 def client_killed(t):
     rig, client = begin_driving(t, 250, 250, 0.6)

@@ -144,6 +144,21 @@ void board_links(uint64_t t_us) {
     board_writes(0, t_us, "{\"event\":\"link\",\"boot\":\"" BOOT "\",\"version\":\"1\"}");
 }
 
+void board_answers(uint8_t channel, const char *words, const char *rest) {
+    char text[128];
+    const char *at = NULL;
+    for (const char *next = to_board; (next = strstr(next, words)) != NULL; next++) {
+        at = next;
+    }
+    TEST_ASSERT_NOT_NULL_MESSAGE(at, to_board);
+    while (strncmp(at, "{\"id\":", 6) != 0) {
+        TEST_ASSERT_TRUE(at > to_board);
+        at--;
+    }
+    (void)snprintf(text, sizeof text, "{\"id\":%u,\"ok\":%s}", (unsigned)strtoul(&at[6], NULL, 10), rest);
+    board_writes(channel, EARLY + 2 + step, text);
+}
+
 void connect_to(const char *path) {
     struct sockaddr_un address = {.sun_family = AF_UNIX};
     (void)snprintf(address.sun_path, sizeof address.sun_path, "%s", path);

@@ -33,6 +33,8 @@ int run_code(bool (*play)(void));
 
 void board_writes(uint8_t channel, uint64_t t_us, const char *json);
 void board_links(uint64_t t_us);
+/// Answers the last request with this text on the line.
+void board_answers(uint8_t channel, const char *words, const char *rest);
 
 void connect_to(const char *path);
 void client_connects(void);

@@ -55,6 +55,16 @@ TEST(test_link_is_up_from_its_event_on) {
     TEST_ASSERT_EQUAL_UINT(1, line.channel);
 }
 
+/// It is never later than the newest stamp, so never ahead of the board's clock.
+TEST(test_link_time_is_counted_back_from_the_newest_stamp) {
+    (void)receive_link(BOOT, 500000, 1000000);
+    TEST_ASSERT_EQUAL_UINT64(400000, serial_link_time(&state, 900000));
+    TEST_ASSERT_EQUAL_UINT64(500000, serial_link_time(&state, 1000001));
+    TEST_ASSERT_EQUAL_UINT64(0, serial_link_time(&state, 300000));
+    (void)receive(1, 600000, "{\"ok\":true}", 1200000);
+    TEST_ASSERT_EQUAL_UINT64(400000, serial_link_time(&state, 1000000));
+}
+
 TEST(test_link_another_boot_is_a_new_link) {
     (void)receive_link(BOOT, 5000000, 10);
     TEST_ASSERT_EQUAL_INT(SERIAL_NEWS_LINKED, receive_link(OTHER, 6000000, 20));

@@ -145,7 +145,9 @@ static void forward(relay_t *self, relay_channel_t *channel, const sock_client_t
         return;
     }
     place->number = ++self->number;
-    place->length = relay_write_numbered(root, place->number, place->json, SERIAL_JSON_MAX);
+    place->undated = serial_has_age(asked->cmd) && !asked->has_t_us;
+    place->length = relay_write_numbered(root, place->number, place->json,
+                                         SERIAL_JSON_MAX - (place->undated ? SERIAL_DATE_MAX : 0U));
     if (place->kind == SERIAL_MOVES) {
         place->length = write_quoted(self, place, place->length, place->json);
     }

@@ -2,6 +2,7 @@
 // Lines to the board, in the order of their importance.
 #include "relay.h"
 
+#include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -33,6 +34,16 @@ static size_t next_open_or_close(relay_t *self, char *out, size_t size) {
     return 0;
 }
 
+/// Adds the time at which the request was sent.
+static void add_time(const relay_t *self, serial_request_t *request) {
+    char text[SERIAL_DATE_MAX];
+    const int length =
+        snprintf(text, sizeof text, "{\"t_us\":%" PRIu64 ",", serial_link_time(&self->link, request->came_us));
+    memmove(&request->json[length], &request->json[1], request->length - 1U);
+    memcpy(request->json, text, (size_t)length);
+    request->length += (size_t)length - 1U;
+}
+
 static size_t next_request(relay_t *self, char *out, size_t size) {
     for (unsigned i = 0; i < IWN_LINE_CHANNELS; i++) {
         const unsigned number = 1U + (self->next_channel + i) % IWN_LINE_CHANNELS;
@@ -41,6 +52,9 @@ static size_t next_request(relay_t *self, char *out, size_t size) {
             (channel->state == RELAY_WELCOMED) ? serial_queue_next(&channel->queue, self->now_us) : NULL;
         if (request != NULL) {
             self->next_channel = number % IWN_LINE_CHANNELS;
+            if (request->undated && self->now_us >= request->came_us + SERIAL_DATED_US) {
+                add_time(self, request);
+            }
             serial_queue_sent(request, self->now_us);
             return write_line((uint8_t)number, request->json, request->length, out, size);
         }

@@ -9,7 +9,8 @@
 /// - If the loop was delayed for longer than RELAY_GAP_US (stopped, starved, suspended), waiting requests that could
 ///   lead to motion are refused. After RELAY_LEFT_US every client is closed, because the board has closed the channels.
 /// - A command is sent only if the line has space for it immediately (serial_queue.h).
-/// - Each stop refuses the requests of all clients that were sent before it and could lead to motion.
+/// - Each stop refuses the requests of all clients that were sent before it and could lead to motion. The board does the
+///   same at a stop that does not come from the relay (SERIAL_DATED_US).
 ///
 /// A stop is never refused, waits for no other request, and is not lost when its client disconnects: it has a place of
 /// its own until the board answers, and uses any channel that the board serves.

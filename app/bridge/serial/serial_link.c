@@ -42,6 +42,15 @@ bool serial_link_stamp(const serial_link_t *self, uint64_t then_us, uint64_t *ou
     return false;
 }
 
+uint64_t serial_link_time(const serial_link_t *self, uint64_t then_us) {
+    if (self->stamps == 0U) {
+        return 0;
+    }
+    const serial_stamp_t *stamp = &self->stamp[(self->stamps - 1U) % SERIAL_STAMPS];
+    const uint64_t ago_us = (stamp->received_us > then_us) ? stamp->received_us - then_us : 0U;
+    return (stamp->t_us > ago_us) ? stamp->t_us - ago_us : 0U;
+}
+
 static bool is_boot(const char *text) {
     return strlen(text) == IWN_LINE_BOOT && strspn(text, "0123456789abcdef") == IWN_LINE_BOOT;
 }

@@ -77,6 +77,10 @@ bool serial_link_fell_silent(serial_link_t *self, uint64_t now_us);
 /// Writes the newest stamp that had arrived at that time. Returns false if there was none.
 bool serial_link_stamp(const serial_link_t *self, uint64_t then_us, uint64_t *out_t_us);
 
+/// Returns the board's time then, as far as known: by the newest stamp, and not later than this. The line delays stamps,
+/// so the true time may be later. 0: unknown.
+uint64_t serial_link_time(const serial_link_t *self, uint64_t then_us);
+
 /// Resets the counters of bytes that were not understood.
 void serial_link_forget_noise(serial_link_t *self);
 

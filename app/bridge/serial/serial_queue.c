@@ -17,6 +17,10 @@ serial_kind_t serial_kind_of(iwn_cmd_t cmd) {
     }
 }
 
+bool serial_has_age(iwn_cmd_t cmd) {
+    return cmd == IWN_CMD_ARM || cmd == IWN_CMD_RESET || cmd == IWN_CMD_RELEASE || cmd == IWN_CMD_CONFIRM;
+}
+
 void serial_queue_init(serial_queue_t *self, uint64_t hold_us) {
     memset(self, 0, sizeof *self);
     self->hold_us = hold_us;

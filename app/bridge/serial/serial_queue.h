@@ -27,6 +27,9 @@
 #define SERIAL_FRESH_US 100000U
 /// The same for requests that permit motion.
 #define SERIAL_GRANT_US 1000000U
+/// A request that waited for this time carries the time at which it was sent, if it has a field for that: the board
+/// refuses it if a stop came in the meantime, also one that the relay does not know, such as a press of the e-stop.
+#define SERIAL_DATED_US 50000U
 /// After this time the board has lost a request, or the relay its answer: `arm` may need `echo_ms`.
 #define SERIAL_PATIENCE_US      3000000U
 #define SERIAL_MOVE_PATIENCE_US 1000000U ///< The same for a `drive`.
@@ -35,6 +38,8 @@
     "the wheels were stopped before this request was sent to the board; see why (iwheelctl why), then send it again"
 /// Reply to a request that the board did not answer.
 #define SERIAL_NO_REPLY "the board did not answer: this request or its reply was lost on the serial line; send it again"
+/// Space for that time in the request.
+#define SERIAL_DATE_MAX 32U
 /// Size of a request on the line, without channel and CRC.
 #define SERIAL_JSON_MAX (IWN_LINE_BOARD_MAX - 2U - IWN_LINE_SUFFIX)
 
@@ -59,6 +64,7 @@ typedef struct {
     iwn_id_t id;        ///< Id of the client.
     iwn_error_t error;  ///< ANSWERED, and a stop whose line is refused: the error, ...
     const char *reason; ///< ... and its text.
+    bool undated;       ///< GRANTS: it has no `t_us`, and its command permits one.
     bool ok;            ///< HELD: whether the board accepted it. The rest of the answer is in `json`.
     size_t length;      ///< Length of `json`.
     char json[SERIAL_JSON_MAX];
@@ -73,6 +79,8 @@ typedef struct {
 } serial_queue_t;
 
 serial_kind_t serial_kind_of(iwn_cmd_t cmd);
+/// Returns true for the requests that the board judges by their `t_us`.
+bool serial_has_age(iwn_cmd_t cmd);
 
 void serial_queue_init(serial_queue_t *self, uint64_t hold_us);
 bool serial_queue_is_full(const serial_queue_t *self);
