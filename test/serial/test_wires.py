@@ -608,13 +608,37 @@ def fault_of_the_board(t):
 @scenario("ends cleanly by SIGTERM while a client drives", 3)
 def terminated(t):
     rig, _ = begin_driving(t, 200, 200, 0.4)
+    sent_before = len(rig.cable.from_relay)
     rig.note("gone")
     rig.gateway.signal(signal.SIGTERM)
     t.check(rig.gateway.wait(2) == 0, f"exit code: {rig.gateway.text()[-300:]}")
+    time.sleep(0.05)
+    last = bytes(rig.cable.from_relay[sent_before:])
+    t.rule(b'"close","channel":' in last, f"the board is informed that the client has gone: {last}")
     t.check(not os.path.exists(rig.path("gateway.sock")), "its socket is removed")
     rig.start_relay()
     rig.await_relay("board on ")
     end_well(t, rig, await_service(t, rig))
+
+
+@scenario("a stop that comes directly before SIGTERM reaches the board over a slow cable", 4)
+def stop_before_the_end(t):
+    rig, client = begin_driving(t, 200, 200, 0.4)
+    rig.cable.held = True
+    time.sleep(0.03)  # The cable has delivered the bytes that it held.
+    client.send_raw(b'{"cmd":"estop","id":901}\n')
+    rig.gateway.signal(signal.SIGTERM)
+    time.sleep(0.1)
+    rig.cable.held = False
+    t.check(rig.gateway.wait(2) == 0, f"exit code: {rig.gateway.text()[-300:]}")
+    t.check("no reply" not in rig.gateway.text(), rig.gateway.text()[-300:])
+    rig.start_relay()
+    rig.await_relay("board on ")
+    client = await_service(t, rig)
+    state = client.request("status")["state"]
+    t.rule(state == "latched", f"the board has executed the e-stop: {state}")
+    t.reset(client)
+    t.silence(rig, client, 6)
 
 
 @scenario("iwheelctl, unchanged, through the relay", 5)

@@ -78,6 +78,11 @@ void serial_port_close(serial_port_t *self) {
     self->fd = -1;
 }
 
+bool serial_port_end(serial_port_t *self) {
+    serial_port_close(self);
+    return true;
+}
+
 ssize_t serial_port_read(const serial_port_t *self, char *out, size_t size) {
     const size_t count = (to_relay_length < size) ? to_relay_length : size;
     (void)self;

@@ -346,3 +346,95 @@ TEST(test_relay_board_offline_is_logged_each_time) {
     run_logged(board_goes);
     TEST_ASSERT_EQUAL_UINT_MESSAGE(2, logged("warning: nothing comes"), complaints);
 }
+
+// The end by a signal -------------------------------------------------------------------------------------------------
+
+static unsigned answer_at; ///< Step at which the board answers the stop; 0: never.
+static unsigned last_step;
+
+/// The line is busy when the client sends a stop and the relay receives the signal.
+static bool stop_at_the_end(void) {
+    begin_with_a_client();
+    if (step == 100U) {
+        relay.free_us = now_us + 20000U;
+        client_writes("{\"cmd\":\"estop\",\"id\":1}\n");
+    }
+    if (answer_at != 0U && step == answer_at) {
+        board_answers(1, "\"estop\"", "true");
+    }
+    for (uint8_t i = 1; step == 140U && i <= IWN_LINE_CHANNELS; i++) {
+        board_writes(i, EARLY + 140,
+                     "{\"event\":\"hello\"}"); // Of the channel that the relay opens for the repetition.
+    }
+    if (step > 101U) {
+        TEST_ASSERT_NOT_EQUAL(0, access(settings.northbound.socket, F_OK));
+    }
+    last_step = step;
+    return step == 100U;
+}
+
+TEST(test_relay_stop_is_sent_and_answered_before_the_end) {
+    answer_at = 150U;
+    run_logged(stop_at_the_end);
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(1, written("\"estop\""), to_board);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(strstr(to_board, "\"estop\""), "\"close\",\"channel\":1"), to_board);
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(0, logged("no reply"), complaints);
+    TEST_ASSERT_UINT_WITHIN(20, 160, last_step);
+}
+
+TEST(test_relay_stop_without_an_answer_at_the_end_is_logged) {
+    answer_at = 0;
+    run_logged(stop_at_the_end);
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(2, written("\"estop\""), to_board);
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(1, logged("1 stop has no reply of the board"), complaints);
+    TEST_ASSERT_UINT_WITHIN(3, 400, last_step);
+}
+
+/// A client drives when the relay ends.
+static bool drive_at_the_end(void) {
+    begin_with_a_client();
+    if (step == 100U) {
+        client_writes("{\"cmd\":\"arm\",\"id\":1}\n");
+    }
+    if (step == 105U) {
+        client_writes("{\"cmd\":\"status\",\"id\":2}\n{\"cmd\":\"drive\",\"left_mm_s\":1,\"right_mm_s\":1}\n");
+        relay.free_us = now_us + 20000U;
+    }
+    last_step = step;
+    return step == 105U;
+}
+
+TEST(test_relay_end_closes_the_channels_and_sends_no_command) {
+    run_logged(drive_at_the_end);
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(2, written("\"close\",\"channel\":1"), to_board); // The first one is at its start.
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(0, written("\"drive\""), to_board);
+    TEST_ASSERT_UINT_WITHIN(15, 125, last_step);
+}
+
+static bool full_port_at_the_end(void) {
+    begin_with_a_client();
+    if (step == 99U) {
+        port_is_full = true;
+    }
+    if (step > 101U) {
+        TEST_ASSERT_LESS_OR_EQUAL_UINT64(relay.ends_us, relay.planned_us); // The wait ends in time.
+    }
+    last_step = step;
+    return step == 100U;
+}
+
+TEST(test_relay_ends_with_a_port_that_accepts_nothing) {
+    run_logged(full_port_at_the_end);
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(0, logged("no reply of the board"), complaints);
+    TEST_ASSERT_UINT_WITHIN(3, 400, last_step);
+}
+
+static bool silent_board_at_the_end(void) {
+    last_step = step;
+    return step == 100U;
+}
+
+TEST(test_relay_without_a_board_ends_immediately) {
+    run_logged(silent_board_at_the_end);
+    TEST_ASSERT_UINT_WITHIN(2, 100, last_step);
+}

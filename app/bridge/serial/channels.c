@@ -311,18 +311,26 @@ void relay_take_line(relay_t *self, const iwn_line_t *line) {
     }
 }
 
-static void drop_client(relay_t *self, relay_channel_t *channel) {
+static void end_client(relay_t *self, relay_channel_t *channel) {
     sock_client_t *client = sock_clients_find(&self->clients, channel->client);
     release(channel);
-    channel->served = false;
     if (client != NULL) {
         sock_service_finish(&self->clients, client);
     }
 }
 
+void relay_end_clients(relay_t *self) {
+    for (unsigned i = 1; i <= IWN_LINE_CHANNELS; i++) {
+        if (self->channel[i].state != RELAY_FREE) {
+            end_client(self, &self->channel[i]);
+        }
+    }
+}
+
 void relay_drop_clients(relay_t *self) {
     for (unsigned i = 1; i <= IWN_LINE_CHANNELS; i++) {
-        drop_client(self, &self->channel[i]);
+        end_client(self, &self->channel[i]);
+        self->channel[i].served = false;
     }
     if (self->link.state == SERIAL_SILENT) {
         relay_stops_refuse(self);

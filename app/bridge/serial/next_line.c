@@ -87,3 +87,11 @@ size_t relay_next_line(relay_t *self, char *out, size_t size) {
     }
     return (length > 0U || self->link.state == SERIAL_SILENT) ? length : next_request(self, out, size);
 }
+
+bool relay_has_ended(const relay_t *self) {
+    bool waits = relay_stops_wait(self, self->now_us) || self->out_length > 0U;
+    for (unsigned i = 1; i <= IWN_LINE_CHANNELS; i++) {
+        waits = waits || self->channel[i].state != RELAY_FREE || self->channel[i].close_due;
+    }
+    return !waits || self->link.state == SERIAL_SILENT || self->now_us >= self->ends_us;
+}

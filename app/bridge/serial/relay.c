@@ -226,7 +226,7 @@ static uint64_t earlier(uint64_t a_us, uint64_t b_us) {
 static uint64_t next_us(const relay_t *self) {
     const bool busy = sock_clients_count(&self->clients) > 0U || relay_stops_wait(self, self->now_us);
     uint64_t then_us = self->now_us + (busy ? RELAY_ALIVE_US / 2U : IDLE_US);
-    then_us = earlier(then_us, sock_service_next_us(&self->clients));
+    then_us = earlier(then_us, earlier(self->ends_us, sock_service_next_us(&self->clients)));
     if (self->port.fd < 0) {
         return earlier(then_us, self->retry_us);
     }
@@ -292,30 +292,60 @@ static void cycle(relay_t *self, bool client_waits) {
     bridge_service_round(&self->service, self->now_us);
 }
 
+/// Waits, then executes one cycle. Returns false if the wait failed.
+static bool turn(relay_t *self, bool *out_end) {
+    struct epoll_event events[EVENTS_PER_WAIT];
+    const uint64_t then_us = sock_service_is_busy(&self->clients) ? 0U : next_us(self);
+    bool knocks = false;
+    self->planned_us = (then_us > self->now_us) ? then_us : self->now_us;
+    const int count = sock_wakeup_wait(&self->wakeup, events, EVENTS_PER_WAIT, 0U, then_us);
+    if (count < 0) {
+        return errno == EINTR; // The wait has no result: waiting bytes must not count as new.
+    }
+    self->now_us = iwl_clock_now_us();
+    self->clients.now_us = self->now_us;
+    judge_gap(self);
+    for (int i = 0; i < count; i++) {
+        knocks = note_event(self, &events[i], out_end) || knocks;
+    }
+    cycle(self, knocks);
+    return true;
+}
+
 static int loop(relay_t *self) {
     bool ends = false;
     bridge_service_notify(&self->service, "READY=1");
-    while (!ends) {
-        struct epoll_event events[EVENTS_PER_WAIT];
-        const uint64_t then_us = sock_service_is_busy(&self->clients) ? 0U : next_us(self);
-        bool knocks = false;
-        self->planned_us = (then_us > self->now_us) ? then_us : self->now_us;
-        const int count = sock_wakeup_wait(&self->wakeup, events, EVENTS_PER_WAIT, 0U, then_us);
-        if (count < 0) {
-            if (errno != EINTR) {
-                return EX_SOFTWARE;
-            }
-            continue; // The wait has no result: waiting bytes must not count as new.
-        }
-        self->now_us = iwl_clock_now_us();
-        self->clients.now_us = self->now_us;
-        judge_gap(self);
-        for (int i = 0; i < count; i++) {
-            knocks = note_event(self, &events[i], &ends) || knocks;
-        }
-        cycle(self, knocks);
+    while (!ends && turn(self, &ends)) {
     }
-    return 0;
+    return ends ? 0 : EX_SOFTWARE;
+}
+
+static void close_listeners(relay_t *self) {
+    for (unsigned right = 0; right < SOCK_RIGHTS; right++) {
+        sock_listener_close(&self->clients.listener[right]);
+        self->clients.listener[right].from_us = 0;
+    }
+}
+
+/// Ends all clients, and runs until their stops are answered and the board has been sent the closes: leases end without
+/// delay, and no stop is lost. Without a board nothing can be sent.
+static void finish(relay_t *self) {
+    bool again = false;
+    bridge_service_notify(&self->service, "STOPPING=1");
+    close_listeners(self);
+    (void)epoll_ctl(self->clients.epoll_fd, EPOLL_CTL_DEL, self->signal_fd, NULL); // It would wake each wait.
+    relay_end_clients(self);
+    write_port(self);
+    self->ends_us = self->now_us + RELAY_END_US;
+    while (!relay_has_ended(self) && turn(self, &again)) {
+    }
+    relay_stops_report(self);
+    relay_drop_clients(self);
+    sock_service_flush(&self->clients, IW_CLIENT_NONE);
+    sock_service_close_all(&self->clients);
+    if (!serial_port_end(&self->port)) {
+        sock_log(&self->log, SOCK_LOG_WARNING, "the port did not send the last lines; check that the wheels stop");
+    }
 }
 
 static int open_sockets(relay_t *self) {
@@ -351,6 +381,7 @@ static void compose(relay_t *self, const serial_settings_t *settings) {
         self->clients.listener[right] = (sock_listener_t){.fd = -1, .reserve_fd = -1, .folder = {.fd = -1}};
     }
     self->backoff_us = BACKOFF_MIN_US;
+    self->ends_us = UINT64_MAX;
     self->now_us = iwl_clock_now_us();
     self->clients.now_us = self->now_us;
     sock_log_open(&self->log, SOCK_LOG_INFO);
@@ -381,14 +412,10 @@ int relay_run(relay_t *self, const serial_settings_t *settings) {
         sock_log(&self->log, SOCK_LOG_INFO, "%s at %u bit/s, clients on %s", settings->board.port,
                  (unsigned)settings->board.baud, settings->northbound.socket);
         result = loop(self);
-        bridge_service_notify(&self->service, "STOPPING=1");
-        relay_drop_clients(self);
-        write_port(self); // As far as possible: the board also ends clients after silence.
-        sock_service_close_all(&self->clients);
+        finish(self);
     }
     serial_port_close(&self->port);
-    sock_listener_close(&self->clients.listener[SOCK_WATCH]);
-    sock_listener_close(&self->clients.listener[SOCK_DRIVE]);
+    close_listeners(self);
     sock_log_close(&self->log);
     return result;
 }

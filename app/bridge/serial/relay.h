@@ -13,7 +13,8 @@
 ///   same at a stop that does not come from the relay (SERIAL_DATED_US).
 ///
 /// A stop is never refused, waits for no other request, and is not lost when its client disconnects: it has a place of
-/// its own until the board answers, and uses any channel that the board serves.
+/// its own until the board answers, and uses any channel that the board serves. After SIGTERM the relay ends its clients,
+/// and continues until the stops are answered and the channels closed, for at most RELAY_END_US.
 ///
 ///     port: CLOSED --opens--> ASKING (link, every RELAY_ASK_US) --event link--> LINKED: clients are served
 ///                ^------------- goes, or cannot be written to -----'
@@ -35,6 +36,8 @@
 #define RELAY_ALIVE_US 50000U
 #define RELAY_GAP_US   100000U
 #define RELAY_LEFT_US  400000U
+/// After a signal the relay sends stops and closes, and waits for the answers to the stops, for at most this time.
+#define RELAY_END_US 300000U
 /// Request for the identity of the board, which begins the link.
 #define RELAY_ASK    "{\"cmd\":\"link\"}"
 #define RELAY_ASK_US 300000U
@@ -117,6 +120,7 @@ typedef struct {
     uint64_t asked_us;   ///< Time of the last request for the link.
     uint64_t retry_us;   ///< Time of the next attempt to open the port.
     uint64_t backoff_us;
+    uint64_t ends_us;        ///< After the signal: latest time of the end. UINT64_MAX before.
     serial_trouble_t judged; ///< Bytes received while no board answers.
     char trouble[512];       ///< Reason why there is no board, for clients that connect.
     size_t out_length;
@@ -146,6 +150,9 @@ void relay_pass_reply(relay_t *self, sock_client_t *client, const serial_request
 /// Handles a line of the board for a client.
 void relay_take_line(relay_t *self, const iwn_line_t *line);
 
+/// Ends every client at the end of the relay. The board still serves their channels: stops are sent before the closes.
+void relay_end_clients(relay_t *self);
+
 /// Handles another board, or a lost one: closes every client, and every channel when there is a board again.
 void relay_drop_clients(relay_t *self);
 
@@ -155,6 +162,10 @@ uint64_t relay_channels_next_us(const relay_t *self);
 
 /// Writes the next line for the board to `out`. Returns its length; 0 if there is none.
 size_t relay_next_line(relay_t *self, char *out, size_t size);
+
+/// Returns true if stops are answered, closes are sent and no channel is in use, or the time for that has expired, or no
+/// board answers.
+bool relay_has_ended(const relay_t *self);
 
 // ---- stops.c: stop requests ---------------------------------------------------------------------------------------
 
@@ -183,6 +194,9 @@ void relay_stops_age(relay_t *self);
 uint64_t relay_stops_next_us(const relay_t *self);
 /// Returns true if a stop that came until then has no answer yet.
 bool relay_stops_wait(const relay_t *self, uint64_t since_us);
+
+/// Logs the number of stops without an answer, if there are any.
+void relay_stops_report(relay_t *self);
 
 /// Writes the stop that is sent now. Returns its length; 0 if there is none, or the board serves no channel yet.
 size_t relay_next_stop(relay_t *self, char *out, size_t size);

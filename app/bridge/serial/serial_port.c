@@ -11,6 +11,7 @@
 #include <sys/stat.h>
 #include <sys/sysmacros.h>
 #include <termios.h>
+#include <time.h>
 #include <unistd.h>
 
 static const struct {
@@ -132,13 +133,41 @@ int serial_port_open(serial_port_t *self, const char *path, uint32_t baud, char 
     return 0;
 }
 
+static void release(serial_port_t *self) {
+    (void)ioctl(self->fd, TIOCNXCL);
+    (void)close(self->fd);
+    self->fd = -1;
+}
+
 void serial_port_close(serial_port_t *self) {
     if (self->fd >= 0) {
-        (void)ioctl(self->fd, TIOCNXCL);
         (void)tcflush(self->fd, TCIOFLUSH); // Otherwise the last close waits for a cable without a reader.
-        (void)close(self->fd);
-        self->fd = -1;
+        release(self);
     }
+}
+
+/// Returns false if the number is unknown.
+static bool has_sent_all(const serial_port_t *self) {
+    int left = 0;
+    return ioctl(self->fd, TIOCOUTQ, &left) == 0 && left == 0;
+}
+
+/// A flush would also drop bytes that the other end of a pseudo terminal has not read, so there is none after the last
+/// byte.
+bool serial_port_end(serial_port_t *self) {
+    const struct timespec pause = {.tv_nsec = 1000000};
+    if (self->fd < 0) {
+        return true;
+    }
+    for (unsigned i = 0; i < SERIAL_PORT_LAST_MS && !has_sent_all(self); i++) {
+        (void)nanosleep(&pause, NULL);
+    }
+    if (!has_sent_all(self)) {
+        serial_port_close(self);
+        return false;
+    }
+    release(self);
+    return true;
 }
 
 /// Returns the number of bytes of a call. Nothing for now is not an error.

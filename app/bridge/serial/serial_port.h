@@ -8,6 +8,9 @@
 #include <stdint.h>
 #include <sys/types.h>
 
+/// Time of 500 bytes at 115200 bit/s.
+#define SERIAL_PORT_LAST_MS 50U
+
 typedef struct {
     int fd; ///< Descriptor; -1 if not open.
 } serial_port_t;
@@ -15,7 +18,11 @@ typedef struct {
 /// Opens `path` with this bit rate. Returns 0, or an errno with cause and fix in `out_why`. EBUSY: another program has
 /// it. Waiting bytes are dropped.
 int serial_port_open(serial_port_t *self, const char *path, uint32_t baud, char *out_why, size_t size);
+/// Closes it and drops the bytes that were not sent.
 void serial_port_close(serial_port_t *self);
+/// Closes it after the kernel has sent the last bytes, for which it waits at most SERIAL_PORT_LAST_MS. Returns false if
+/// bytes were dropped. Does nothing if it is not open.
+bool serial_port_end(serial_port_t *self);
 
 /// Returns the number of bytes, 0 if there are none now, -1 if the port is gone.
 ssize_t serial_port_read(const serial_port_t *self, char *out, size_t size);

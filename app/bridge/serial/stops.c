@@ -260,6 +260,18 @@ bool relay_stops_wait(const relay_t *self, uint64_t since_us) {
     return wait;
 }
 
+void relay_stops_report(relay_t *self) {
+    unsigned count = 0;
+    for (unsigned i = 0; i < RELAY_STOPS; i++) {
+        count += is_unanswered(&self->stop[i]) ? 1U : 0U;
+    }
+    if (count > 0U) {
+        sock_log(&self->log, SOCK_LOG_WARNING,
+                 "%u stop%s no reply of the board, and the relay ends; check that the wheels stop, or press the e-stop",
+                 count, (count == 1U) ? " has" : "s have");
+    }
+}
+
 uint64_t relay_stops_next_us(const relay_t *self) {
     uint64_t next_us = UINT64_MAX;
     for (unsigned i = 0; i < RELAY_STOPS; i++) {
