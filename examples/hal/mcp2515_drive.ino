@@ -77,11 +77,25 @@ void setup() {
     iw_gateway_bus_facts(&gateway, &facts);
 }
 
+/// Prints each new state, also that of the zeros at the start ("stopping"), and each new reason to wait.
+static void report(iw_refusal_t refusal) {
+    static const char *const names[] = {"listening", "armed", "stopping", "latched"};
+    static int state_before = -1;
+    static iw_refusal_t refusal_before = IW_REFUSE_NONE;
+    const iw_state_t state = iw_gateway_state(&gateway);
+    if (state != state_before) {
+        Serial.println(names[state]);
+    }
+    if (refusal != IW_REFUSE_NONE && refusal != refusal_before) {
+        Serial.println(iw_refusal_text(refusal));
+    }
+    state_before = state;
+    refusal_before = refusal;
+}
+
 void loop() {
     const iw_time_us_t now_us = hal_mcp2515_time_us(&bus);
     const iw_refusal_t refusal = first_drive_command(&gateway, now_us);
-    if (refusal != IW_REFUSE_NONE) {
-        Serial.println(iw_refusal_text(refusal));
-    }
     (void)iw_gateway_step(&gateway, now_us);
+    report(refusal);
 }

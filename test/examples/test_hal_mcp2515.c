@@ -369,23 +369,43 @@ static int16_t follow(uint32_t buffer, iw_side_t side, int16_t speed_mm_s) {
     return speed_mm_s;
 }
 
-TEST(test_mcp2515_first_drive_arms_drives_and_stops) {
+/// The wheels are online from `from_ms` on.
+static void run_first_drive(bool restarted, uint32_t from_ms, uint32_t until_ms) {
     static iw_gateway_t gateway;
     const iw_bus_facts_t facts = {.echo_proven = true};
     int16_t speed_mm_s[IW_SIDES] = {0};
     int16_t fastest_mm_s = 0;
-    TEST_ASSERT_TRUE(first_drive_init(&gateway, &hal, hal_mcp2515_time_us(&self), false));
+    iw_refusal_t refused = IW_REFUSE_NONE;
+    TEST_ASSERT_TRUE(first_drive_init(&gateway, &hal, hal_mcp2515_time_us(&self), restarted));
     iw_gateway_bus_facts(&gateway, &facts);
-    for (uint32_t ms = 0; ms < 4000U; ms++) {
+    for (uint32_t ms = 0; ms < until_ms; ms++) {
         model.now_us += 1000;
-        speed_mm_s[IW_LEFT] = follow(2, IW_LEFT, speed_mm_s[IW_LEFT]);
-        speed_mm_s[IW_RIGHT] = follow(1, IW_RIGHT, speed_mm_s[IW_RIGHT]);
+        if (ms == from_ms) {
+            TEST_ASSERT_EQUAL_INT((from_ms > 0U) ? IW_REFUSE_WHEEL_LOST : IW_REFUSE_NONE, refused);
+        }
+        if (ms >= from_ms) {
+            speed_mm_s[IW_LEFT] = follow(2, IW_LEFT, speed_mm_s[IW_LEFT]);
+            speed_mm_s[IW_RIGHT] = follow(1, IW_RIGHT, speed_mm_s[IW_RIGHT]);
+        }
         fastest_mm_s = (speed_mm_s[IW_LEFT] > fastest_mm_s) ? speed_mm_s[IW_LEFT] : fastest_mm_s;
         interrupt();
-        (void)first_drive_command(&gateway, hal_mcp2515_time_us(&self));
+        refused = first_drive_command(&gateway, hal_mcp2515_time_us(&self));
         (void)iw_gateway_step(&gateway, hal_mcp2515_time_us(&self));
     }
     TEST_ASSERT_EQUAL_INT(200, fastest_mm_s);
     TEST_ASSERT_EQUAL_INT(0, speed_mm_s[IW_LEFT]);
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_gateway_state(&gateway));
+}
+
+TEST(test_mcp2515_first_drive_arms_drives_and_stops) {
+    run_first_drive(false, 0, 4000);
+}
+
+/// The sketch cannot know whether the reset came in motion, so the zeros come first.
+TEST(test_mcp2515_first_drive_after_a_reset_drives_and_stops) {
+    run_first_drive(true, 0, 6000);
+}
+
+TEST(test_mcp2515_first_drive_waits_for_the_wheels) {
+    run_first_drive(false, 3000, 8000);
 }
