@@ -92,7 +92,9 @@ static void take_answer(void *context, const iwc_message_t *reply) {
         (void)snprintf(self->order.key, sizeof self->order.key, "%s", (key != NULL) ? key : "");
         bridge->silent_us = bridge->now_us + MQTT_FIRST_US;
     }
-    answer(bridge, &self->order, (self->order.verdict == MQTT_TAKEN) ? reply : NULL);
+    // A stop without JSON is garbled and yet sent on. What the gateway refuses (a board that is gone) is not executed.
+    const bool passes = self->order.verdict == MQTT_TAKEN || iwc_truth(reply, "ok").value != 1;
+    answer(bridge, &self->order, passes ? reply : NULL);
 }
 
 static void ask(mqtt_bridge_t *self, const mqtt_order_t *order) {

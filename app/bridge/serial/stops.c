@@ -6,6 +6,7 @@
 #include "iwheel_northbound/json_out.h"
 
 #define BAD_JSON      "not one JSON object on one line; its stop is executed"
+#define NOT_CONFIRMED "the line is refused; its stop is sent to the board, which has not confirmed it yet"
 #define LINE_TOO_LONG "a request has at most 4096 bytes and ends with a newline; its stop is executed"
 IW_STATIC_ASSERT(IWN_LINE_MAX == 4096U, the_message_has_this_number);
 
@@ -179,7 +180,7 @@ void relay_stop_last(relay_t *self, sock_client_t *client, const iwn_request_t *
         (void)put(self, client, asked);
     }
     if (asked->refused != IWN_OK && relay_channel_of(self, client) != NULL) {
-        relay_refuse(self, client, &asked->id, asked->refused, reason_of(asked));
+        relay_refuse(self, client, &asked->id, asked->refused, NOT_CONFIRMED);
     }
 }
 
