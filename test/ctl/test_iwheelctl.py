@@ -650,7 +650,7 @@ class Driving(WithGateway):
         until(lambda: self.gateway.closed_at is not None)
         self.assertGreater(self.gateway.closed_at - times[-1], 0.5)
         arm = next(request for _, request in self.gateway.requests if request["cmd"] == "arm")
-        self.assertEqual({"cmd": "arm", "name": "iwheelctl", "id": arm["id"]}, arm)
+        self.assertEqual({"cmd": "arm", "name": "iwheelctl", "t_us": snapshot()["t_us"], "id": arm["id"]}, arm)
         first = next(request for _, request in self.gateway.requests if request["cmd"] == "drive")
         self.assertEqual({"cmd": "drive", "left_mm_s": -300, "right_mm_s": 250, "id": first["id"]}, first)
 

@@ -12,6 +12,7 @@ import socket
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 
 sys.path.append(os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "support"))  # verdict.py
@@ -212,6 +213,28 @@ class Sim:
         self.process.end()
 
 
+class Hand:
+    """Pushes both wheels without a pause until `let_go`. After at most 5 s of pushing they are at standstill within 1 s."""
+
+    STEP_S = 0.05
+    STEP_M = 0.09  # The simulated hand needs 0.06 s for it.
+
+    def __init__(self, sim):
+        self.sim = sim
+        self.ended = threading.Event()
+        self.thread = threading.Thread(target=self.push, daemon=True)
+        self.thread.start()
+
+    def push(self):
+        while not self.ended.is_set():
+            self.sim.ask(f"push both {self.STEP_M}")
+            self.ended.wait(self.STEP_S)
+
+    def let_go(self):
+        self.ended.set()
+        self.thread.join()
+
+
 def wait_connect(path, process, seconds=5.0):
     deadline = time.monotonic() + seconds
     while True:
@@ -304,6 +327,9 @@ class Rig:
         for section, keys in sections.items():
             self.settings.setdefault(section, {}).update(keys)
         self.write_config()
+
+    def hand(self):
+        return Hand(self.sim)
 
     def write_config(self, name="gateway.conf"):
         with open(self.path(name), "w", encoding="utf-8") as file:

@@ -253,30 +253,36 @@ static burst_end_t refuse(run_t *run) {
 }
 
 /// Waits until the wheels are ready, and arms. It tries again because a wheel with late telemetry counts as not at
-/// standstill for a moment longer.
+/// standstill for a moment longer. A stop of any client in the meantime ends this.
 static burst_end_t arm(run_t *run) {
     bringup_t *self = run->bringup;
     outcome_t *outcome = run->outcome;
+    json_t *request = json_pack("{s:s,s:s}", "cmd", "arm", "name", "bringup");
+    bool ok = false;
     bool waits = true;
     for (unsigned tries = 0; tries < ARM_TRIES && waits; tries++) {
         if (!ready_to_move(self, outcome->why, sizeof outcome->why)) {
             break;
+        }
+        json_t *status = trial_status(self);
+        if (tries == 0U) {
+            ctl_set_time(request, status);
         }
         json_t *why = near_ask(self->ctl, json_pack("{s:s}", "cmd", "why"));
         run->stops = json_integer_value(json_object_get(why, "number"));
         json_decref(why);
         json_decref(
             near_ask(self->ctl, json_pack("{s:s,s:[s],s:i}", "cmd", "watch", "topics", "state", "rate_hz", 50)));
-        json_t *armed = near_ask(self->ctl, json_pack("{s:s,s:s}", "cmd", "arm", "name", "bringup"));
-        const bool ok = json_is_true(json_object_get(armed, "ok"));
+        json_t *armed = near_ask(self->ctl, json_incref(request));
+        ctl_set_time(request, status);
+        json_decref(status);
+        ok = json_is_true(json_object_get(armed, "ok"));
         waits = strcmp(text_word(armed, "error"), "not_at_rest") == 0;
         (void)snprintf(outcome->why, sizeof outcome->why, "%s", text_word(armed, "message"));
         json_decref(armed);
-        if (ok) {
-            return BURST_DONE;
-        }
     }
-    return refuse(run);
+    json_decref(request);
+    return ok ? BURST_DONE : refuse(run);
 }
 
 /// Arms, drives, stops and waits until both are at standstill. Any key stops immediately.

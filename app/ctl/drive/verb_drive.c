@@ -6,7 +6,8 @@
 //                '-------------------------------------------^
 //
 // The program arms once and never again: whatever ends the lease ends the program. Only if arm is refused because the
-// wheels are not at standstill yet, it waits and tries again, for one second at most.
+// wheels are not at standstill yet, it waits and tries again, for one second at most. A stop of any client in the
+// meantime ends the wait.
 #include "drive_words.h"
 #include "talk/ctl.h"
 #include "text/ctl_text.h"
@@ -201,20 +202,28 @@ static int ask_quietly(const drive_t *self, json_t *request, json_t **out_reply)
     return code;
 }
 
+/// Reads the snapshot. Returns an exit code.
+static int read_status(drive_t *self) {
+    json_t *status = NULL;
+    const int code = ask_quietly(self, json_pack("{s:s}", "cmd", "status"), &status);
+    if (code == CTL_OK) {
+        retain(&self->latest, status);
+    }
+    json_decref(status);
+    return code;
+}
+
 /// Waits until both wheels are at standstill and the next drive is not refused because of this one. Another signal ends
 /// the wait.
 static int wait_for_rest(drive_t *self) {
     const int64_t begin_us = client_now_us();
     const int64_t fresh_us = self->sent_us + ((self->lease_us > FRESH_US) ? self->lease_us : FRESH_US);
     for (;;) {
-        json_t *status = NULL;
         json_t *event = NULL;
-        const int code = ask_quietly(self, json_pack("{s:s}", "cmd", "status"), &status);
+        const int code = read_status(self);
         if (code != CTL_OK) {
             return code;
         }
-        retain(&self->latest, status);
-        json_decref(status);
         const int64_t now_us = client_now_us();
         if (both_stand(self->latest) && now_us >= fresh_us) {
             return CTL_OK;
@@ -334,20 +343,32 @@ static bool passes(const json_t *reply) {
     return json_is_false(json_object_get(reply, "ok")) && strcmp(text_word(reply, "error"), "not_at_rest") == 0;
 }
 
+/// Waits, and arms again. The request still has the time of an earlier attempt, so a stop in the meantime refuses it.
+/// Afterwards it has the time of this attempt, for the next one. Returns an exit code.
+static int arm_again(drive_t *self, json_t *request, json_t **out_reply) {
+    json_decref(*out_reply);
+    *out_reply = NULL;
+    int code = wait_a_moment(self);
+    if (code == CTL_OK) {
+        code = read_status(self);
+    }
+    if (code == CTL_OK) {
+        code = ctl_exchange(self->ctl, json_incref(request), out_reply);
+        ctl_set_time(request, self->latest);
+    }
+    return code;
+}
+
 /// Arms, and tries again while the wheels are not at standstill. Returns as ctl_ask does.
-static int ask_to_arm(const drive_t *self, json_t *request, json_t **out_reply) {
+static int ask_to_arm(drive_t *self, json_t *request, json_t **out_reply) {
     const int64_t end_us = client_now_us() + ARM_PATIENCE_US;
+    ctl_set_time(request, self->latest);
     int code = ctl_exchange(self->ctl, json_incref(request), out_reply);
     if (code == CTL_OK && passes(*out_reply)) {
         (void)ctl_fail(CTL_OK, "waiting for one second at most, because %s", text_word(*out_reply, "message"));
     }
     while (code == CTL_OK && passes(*out_reply) && client_now_us() < end_us) {
-        json_decref(*out_reply);
-        *out_reply = NULL;
-        code = wait_a_moment(self);
-        if (code == CTL_OK) {
-            code = ctl_exchange(self->ctl, json_incref(request), out_reply);
-        }
+        code = arm_again(self, request, out_reply);
     }
     json_decref(request);
     return (code == CTL_OK) ? ctl_accept(self->ctl, out_reply) : code;
@@ -362,7 +383,7 @@ static int arm(drive_t *self) {
         ask_quietly(self, json_pack("{s:s,s:[s],s:i}", "cmd", "watch", "topics", "state", "rate_hz", 10), &reply);
     json_decref(reply);
     if (code == CTL_OK) {
-        code = ask_quietly(self, json_pack("{s:s}", "cmd", "status"), &self->latest);
+        code = read_status(self);
     }
     if (code != CTL_OK) {
         return code;

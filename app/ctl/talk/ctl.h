@@ -88,6 +88,11 @@ typedef void (*ctl_stopped_t)(const ctl_t *self, const char *path, const json_t 
 /// at least one gateway executed it.
 int ctl_stop(ctl_t *self, const ctl_stop_t *stop, ctl_stopped_t stopped);
 
+/// Sets the time of an arm request to that of the snapshot `status` (NULL: no change). The gateway then refuses it after
+/// a later stop. Before a repeated arm, use the snapshot that preceded the last attempt refused as not_at_rest: the
+/// gateway judges the time first, so that refusal shows that there was no stop until then.
+void ctl_set_time(json_t *request, const json_t *status);
+
 /// First half of `ctl_ask`: returns 0 with any reply in `*out_reply`. Prints only errors of the connection.
 int ctl_exchange(ctl_t *self, json_t *request, json_t **out_reply);
 

@@ -264,6 +264,10 @@ int ctl_stop(ctl_t *self, const ctl_stop_t *stop, ctl_stopped_t stopped) {
     return code;
 }
 
+void ctl_set_time(json_t *request, const json_t *status) {
+    (void)json_object_set(request, "t_us", json_object_get(status, "t_us"));
+}
+
 int ctl_ask(ctl_t *self, json_t *request, json_t **out_reply) {
     const int code = ctl_exchange(self, request, out_reply);
     return (code == CTL_OK) ? ctl_accept(self, out_reply) : code;
