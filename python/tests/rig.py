@@ -54,6 +54,10 @@ class RigCase(unittest.TestCase):
         """Time of the last nonzero setpoint on the bus; 0: none."""
         return max((t for t, _, speed in self.rig.bus.setpoints() if speed != 0), default=0)
 
+    def assert_never_moved(self):
+        speeds = [speed for _, _, speed in self.rig.bus.setpoints() if speed != 0]
+        hold(not speeds, f"{len(speeds)} nonzero setpoints, the first {speeds[:1]} mm/s")
+
     def assert_stood_by(self, t_us, within_ms):
         """Asserts that no nonzero setpoint came later than that, and that zeros followed the last one."""
         last = self.last_motion_us()

@@ -57,7 +57,7 @@ class Client(asyncio.Protocol):
         if request["cmd"] == "arm":
             reply.update(ARMED)
         elif request["cmd"] == "status":
-            reply.update(left=STANDSTILL, right=STANDSTILL, lease={"holder": None})
+            reply.update(t_us=1, left=STANDSTILL, right=STANDSTILL, lease={"holder": None})
         elif request["cmd"] == "drive":
             reply.update({key: request.get(key, 0) for key in ("left_mm_s", "right_mm_s", "left_mA", "right_mA")}, limited=False)
         elif request["cmd"] == "watch":

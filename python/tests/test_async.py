@@ -179,6 +179,29 @@ class Async(RigCase):
         self.assertEqual(self.run_async(story()), "stale_command")
         self.assert_stood_by(now_us(), 0)
 
+    def test_stop_of_another_client_ends_an_arm_that_waits(self):
+        async def drive():
+            async with AsyncGateway(self.socket).arm(wait=10) as wheels:
+                await wheels.drive_for(0.3, 200, 200)
+
+        async def story(seconds):
+            hand = self.rig.hand()
+            self.addCleanup(hand.let_go)
+            async with AsyncGateway(self.socket) as other:
+                while (await other.status())["left"]["at_rest"]:
+                    await asyncio.sleep(0.02)
+                task = asyncio.ensure_future(drive())
+                await asyncio.sleep(seconds)
+                await other.stop()
+                hand.let_go()
+                with self.assertRaisesRegex(Refused, r"the wheels were stopped after t_us .* \(it was refused before, because the wheels turn"):
+                    await task
+                await asyncio.sleep(1)
+
+        for seconds in (0.3, 1.5):  # The second one is longer than max_age_ms.
+            self.run_async(story(seconds))
+            self.assert_never_moved()
+
     def test_task_cancelled_while_arming_leaves_nothing_armed(self):
         async def drive():
             async with AsyncGateway(self.socket).arm(wait=30):

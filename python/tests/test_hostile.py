@@ -19,13 +19,15 @@ from iwheel import AsyncGateway, Gateway, GatewayUnavailable, NoAnswer, Protocol
 
 HELLO = b'{"event":"hello","api":1,"client":1}\n'
 NEWER = b'{"event":"hello","version":"9.1.0","api":2,"client":1}\n'
+CLOCK = b'{"id":1,"ok":true,"t_us":1}\n'
+"""Reply to the status that precedes an arm."""
 
 
 class Impostor:
-    """Accepts one connection after another and sends its answer after the first request of each."""
+    """Accepts one connection after another and sends its answer after the first request of each; with `before`, sends that first."""
 
-    def __init__(self, answer, close=False, hello=HELLO):
-        self.hello = hello
+    def __init__(self, answer, close=False, hello=HELLO, before=b""):
+        self.hello, self.before = hello, before
         self.folder = tempfile.TemporaryDirectory()
         self.path = os.path.join(self.folder.name, "socket")
         self.answer, self.close, self.received = answer, close, []
@@ -45,6 +47,9 @@ class Impostor:
             try:
                 connection.sendall(self.hello)
                 self.received.append(connection.recv(5000))
+                if self.before:
+                    connection.sendall(self.before)
+                    self.received.append(connection.recv(5000))
                 connection.sendall(self.answer)
             except OSError:
                 pass
@@ -152,7 +157,7 @@ class Hostile(unittest.TestCase):
     def test_no_answer_ends_the_connection_and_its_lease(self):
         for ask in (self.ask_blocking, self.ask_async):
             for cmd in ("arm", "reset"):
-                impostor = Impostor(b"")
+                impostor = Impostor(b"", before=CLOCK if cmd == "arm" else b"")
                 self.addCleanup(impostor.end)
                 ask(impostor, NoAnswer, cmd)
 
@@ -217,10 +222,10 @@ class Hostile(unittest.TestCase):
                 self.both(answer, ProtocolError)
 
     def test_a_lease_does_not_stay_after_a_reply_that_cannot_be_used(self):
-        for answer in (b"[" * 60000 + b"\n", b'{"id":1,"ok":true}\n'):
+        for answer in (b"[" * 60000 + b"\n", b'{"id":2,"ok":true}\n'):
             for ask in (self.ask_blocking, self.ask_async):
                 with self.subTest(answer[:20], ask=ask.__name__):
-                    impostor = Impostor(answer)
+                    impostor = Impostor(answer, before=CLOCK)
                     self.addCleanup(impostor.end)
                     ask(impostor)
 
@@ -268,11 +273,16 @@ class Hostile(unittest.TestCase):
         self.both(answer, GatewayUnavailable, close=True)
 
     def test_arm_is_never_asked_twice(self):
-        impostor = Impostor(b"", close=True)
+        impostor = Impostor(b"", close=True, before=CLOCK)
         self.addCleanup(impostor.end)
         with self.assertRaises(GatewayUnavailable):
             Gateway(impostor.path).arm()
-        self.assertEqual([json.loads(line)["cmd"] for line in impostor.received], ["arm"])
+        self.assertEqual([json.loads(line)["cmd"] for line in impostor.received], ["status", "arm"])
+
+    def test_status_without_time_is_no_reason_to_arm(self):
+        impostor, text = self.both(b'{"id":1,"ok":true}\n', ProtocolError, ask="arm")
+        self.assertIn("the reply to status has no t_us", text)
+        self.assertEqual([json.loads(line)["cmd"] for line in impostor.received], ["status", "status"])
 
     def test_missing_gateway_and_missing_rights_name_the_fix(self):
         with self.assertRaisesRegex(GatewayUnavailable, "no gateway listens there; start it"):

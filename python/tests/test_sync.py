@@ -292,6 +292,73 @@ class Arming(RigCase):
             self.assertGreater(time.monotonic() - begin, 0.7)
             self.assertLess(time.monotonic() - begin, 1.2)
 
+    def test_stick_that_is_never_let_go_ends_the_wait_at_max_age(self):
+        other = self.rig.client("joystick")
+        quit_it = threading.Event()
+
+        def hold():
+            while not quit_it.wait(0.05):
+                other.drive(100, 100)
+
+        stick = threading.Thread(target=hold)
+        stick.start()
+        self.addCleanup(stick.join)
+        self.addCleanup(quit_it.set)
+        time.sleep(0.2)
+        with Gateway(self.socket) as gateway:
+            begin = time.monotonic()
+            with self.assertRaisesRegex(Refused, r"more than 1000 ms after t_us.* \(it was refused before, because client \d+ .*sent a nonzero drive"):
+                gateway.arm(wait=10)
+            self.assertLess(time.monotonic() - begin, 3)
+
+    def push(self):
+        """A hand that pushes the wheels until `let_go`."""
+        hand = self.rig.hand()
+        self.addCleanup(hand.let_go)
+        with Gateway(self.socket) as gateway:
+            self.wait_until(lambda: not gateway.status()["left"]["at_rest"])
+        return hand
+
+    def test_arm_waits_longer_than_max_age_for_standstill(self):
+        hand = self.push()
+        threading.Timer(1.5, hand.let_go).start()
+        begin = time.monotonic()
+        with Gateway(self.socket).arm(wait=10) as wheels:
+            self.assertGreater(time.monotonic() - begin, 1.5)
+            wheels.drive_for(0.3, 200, 200)
+        self.assertGreater(self.last_motion_us(), 0)
+
+    def test_stop_of_another_client_ends_an_arm_that_waits(self):
+        def drive():
+            try:
+                with Gateway(self.socket).arm(wait=10) as wheels:
+                    wheels.drive_for(0.3, 200, 200)
+            except Refused as refusal:
+                refusals.append(str(refusal))
+
+        for seconds in (0.3, 1.5):  # The second one is longer than max_age_ms.
+            refusals, hand = [], self.push()
+            waiting = threading.Thread(target=drive)
+            waiting.start()
+            time.sleep(seconds)
+            with Gateway(self.socket) as other:
+                other.stop()
+            hand.let_go()
+            waiting.join()
+            time.sleep(1)
+            self.assert_never_moved()
+            self.assertRegex(
+                "".join(refusals), r"^arm refused \(stale_command\): the wheels were stopped after t_us .* \(it was refused before, because the wheels turn"
+            )
+
+    def test_arm_that_waits_ends_with_its_connection(self):
+        hand = self.push()
+        gateway = Gateway(self.socket)
+        threading.Timer(0.3, self.rig.kill_gateway, [signal.SIGKILL]).start()
+        with self.assertRaises(GatewayUnavailable):
+            gateway.arm(wait=10)
+        hand.let_go()
+
     def test_permanent_refusal_is_raised_immediately(self):
         with Gateway(self.socket) as gateway:
             gateway.estop()

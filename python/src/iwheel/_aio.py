@@ -26,10 +26,10 @@ from ._wire import (
     ARM_AGAIN_S,
     ARM_S,
     HARMLESS,
-    PASSING,
     REPEATABLE,
     REST_S,
     STOPPED_MEANWHILE,
+    ArmTime,
     Message,
     add_piece,
     Wire,
@@ -432,21 +432,25 @@ class AsyncGateway:
 
     async def _arm(self, name: str | None, takeover: bool, wait: float) -> AsyncArmed:
         until, stops = time.monotonic() + wait, self._stops
-        fields = {"name": name, "takeover": takeover or None}
+        asked = ArmTime(await self._ask("status"))
+        stream = self._stream
+        if stream is None:
+            raise GatewayUnavailable("the connection was closed while arming")
         while True:
-            stream = await self._connected(time.monotonic() + self._wait if self._wait > 0 else None)
             try:
+                fields = {"name": name, "takeover": takeover or None, "t_us": asked.t_us}
                 armed = AsyncArmed(self, stream, terms_of(result_of("arm", await stream.ask("arm", fields, self._timeout))))
                 if self._stops != stops:
                     armed._end(STOPPED_MEANWHILE)
                 return armed
             except Refused as refusal:
-                if refusal.error not in PASSING or self._stops != stops or not time.monotonic() < until:
-                    raise
+                if not asked.refused(refusal) or self._stops != stops or not time.monotonic() < until:
+                    raise asked.reason(refusal) from None
             except BaseException:  # Cancelled, dropped, no usable reply: only closing the connection surely ends a lease that began.
                 stream.close("arming was interrupted")
                 raise
             await asyncio.sleep(ARM_AGAIN_S)
+            asked.begin(result_of("status", await stream.ask("status", {}, self._timeout)))
 
     async def _next_event(self, timeout: float | None, latest: bool) -> Event | None:
         deadline = time.monotonic() + (timeout if timeout is not None else float("inf"))

@@ -23,10 +23,10 @@ from ._wire import (
     ARM_AGAIN_S,
     ARM_S,
     HARMLESS,
-    PASSING,
     REPEATABLE,
     REST_S,
     STOPPED_MEANWHILE,
+    ArmTime,
     Message,
     add_piece,
     applied_of,
@@ -200,22 +200,27 @@ class Gateway:
 
         Other clients can read `name`. `takeover` transfers the lease from another client, with the wheels at standstill. `wait`: seconds for which
         the call repeats the request after a recent stop: while the wheels do not count as at standstill (`not_at_rest`), or a drive command is less
-        than half a second old (`stale_command`). It raises every other refusal immediately. A `stop` of this Gateway in the meantime, by another
-        thread, ends the wait and the permission. `arm` does not notice the `stop` of another client: after LeaseEnded let a person decide before the
-        next `arm`. Only `estop` keeps all clients from driving, until `reset`.
+        than half a second old (`stale_command`). It raises every other refusal immediately. A `stop` of any client in the meantime ends the wait
+        (`stale_command`, with a message about the stop), and so does the end of the connection. A `stop` of this Gateway, by another thread, also
+        ends a permission that was just granted. A drive command of another client that continues ends the wait after `[northbound] max_age_ms`
+        (1 s by default) at the latest. A `stop` before the call does not prevent it: after LeaseEnded let a person decide before the next `arm`.
+        Only `estop` keeps all clients from driving, until `reset`.
         """
         deadline, stops = time.monotonic() + wait, self._stops
-        while True:
-            try:
-                reply = self._ask("arm", name=name, takeover=takeover or None)
-                break
-            except Refused as refusal:
-                if refusal.error not in PASSING or self._stops != stops or not time.monotonic() < deadline:
-                    raise
-            time.sleep(ARM_AGAIN_S)
+        asked = ArmTime(self._ask("status"))
         connection = self._connection
         if connection is None:
             raise GatewayUnavailable("the connection was closed while arming")
+        while True:
+            try:
+                fields = {"name": name, "takeover": takeover or None, "t_us": asked.t_us}
+                reply = self._ask_on(connection, "arm", fields)
+                break
+            except Refused as refusal:
+                if not asked.refused(refusal) or self._stops != stops or not time.monotonic() < deadline:
+                    raise asked.reason(refusal) from None
+            time.sleep(ARM_AGAIN_S)
+            asked.begin(self._ask_on(connection, "status", {}))
         try:
             armed = Armed(self, connection, terms_of(reply))
         except ProtocolError:

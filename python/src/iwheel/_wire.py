@@ -27,7 +27,8 @@ WATCH_FOLDER = "watch"
 HARMLESS = ("out_of_range", "bad_value", "missing_field", "unknown_field", "bad_json")
 """Refusals of a drive command that do not end the permission to drive."""
 PASSING = ("not_at_rest", "stale_command")
-"""Refusals of `arm` that end on their own: when the wheels are at standstill, or the last drive command is half a second old."""
+"""Refusals of `arm` that end on their own: when the wheels are at standstill, or the last drive command is half a second old. A refusal as
+`stale_command` whose message names `t_us` does not end: see ArmTime."""
 REPEATABLE = ("hello", "status", "why", "recordings", "recording")
 """Requests that are repeated on a new connection if the old one broke. They never start a motion."""
 REST_S = 3.0
@@ -145,6 +146,39 @@ def result_of(cmd: str, reply: Message) -> Message:
     if reply["ok"] is not True:
         raise Refused(cmd, str(reply.get("error")), str(reply.get("message")))
     return reply
+
+
+class ArmTime:
+    """`t_us` of an `arm` that is repeated, so that the gateway refuses the next attempt after a stop of any client in the meantime.
+
+    The time of the first attempt would become older than the gateway's limit. A refusal as `not_at_rest` moves it to the time at which the
+    refused attempt began: the gateway judges `t_us` first, so there was no stop until then. No other refusal moves it.
+    """
+
+    def __init__(self, status: Message) -> None:
+        self.t_us: int = fields_of("status", status, ["t_us"])["t_us"]
+        self._begun_us = self.t_us
+        self._earlier: Refused | None = None
+
+    def begin(self, status: Message) -> None:
+        """Begins the next attempt. `status` was requested for it, after the refusal of the last one."""
+        self._begun_us = fields_of("status", status, ["t_us"])["t_us"]
+
+    def refused(self, refusal: Refused) -> bool:
+        """Notes the refusal of this attempt. Returns True if another attempt can be granted."""
+        passing = refusal.error in PASSING and "t_us" not in refusal.message
+        if passing:
+            self._earlier = refusal
+        if refusal.error == "not_at_rest":
+            self.t_us = self._begun_us
+        return passing
+
+    def reason(self, refusal: Refused) -> Refused:
+        """Returns the refusal that ends the wait, with the reason of the wait."""
+        earlier = self._earlier
+        if earlier is None or earlier is refusal:
+            return refusal
+        return Refused(refusal.cmd, refusal.error, f"{refusal.message} (it was refused before, because {earlier.message})")
 
 
 def integer(name: str, value: object) -> int:
