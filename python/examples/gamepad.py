@@ -9,6 +9,8 @@ released, and when the device disappears (unplugged).
 
 A wireless gamepad whose link has died reports nothing, while its receiver stays connected. The wheels therefore also stop 2 s after the last report;
 after 1 s the program prints a warning. Move the stick slightly to drive on. After such a stop release the button and press it again.
+
+A button that was pressed before "armed" moves nothing: release it, then press it again.
 """
 
 import argparse
@@ -61,6 +63,12 @@ class Gamepad:
             else:
                 self.buttons.discard(number)
 
+    def begin(self) -> None:
+        """Reads all that the device has reported so far. From now on only a new press of a button counts."""
+        while select.select([self.file], [], [], 0)[0]:
+            self.update(0)
+        self.buttons.clear()
+
     def silent_s(self) -> float:
         """Seconds since the last report."""
         return time.monotonic() - self.reported
@@ -94,6 +102,7 @@ def steer(options: argparse.Namespace) -> None:
     if options.button in gamepad.buttons | gamepad.at_start:
         raise EOFError("the dead man's button is already held; let go of it, then start again")
     with Gateway(options.socket) as gateway, gateway.arm("gamepad") as wheels:
+        gamepad.begin()
         print(f"armed: hold button {options.button} and steer with the left stick; Ctrl-C ends")
         hold = Hold(gamepad, options.button)
         while True:

@@ -6,6 +6,8 @@ usage: keys.py [--socket PATH] [--speed MM_S]
 
 A terminal reports repeats of a key, not its release: each key counts as held for 0.6 s. The space bar and every other key stop immediately. The
 computer makes the repeats: if the link of a wireless keyboard dies with a key held, they continue. Use a keyboard with a cable.
+
+A key that was pressed before "armed" moves nothing: let go of it, then press it again.
 """
 
 import argparse
@@ -34,15 +36,26 @@ def read_key(seconds: float) -> str:
     return text[-3:] if text[-3:-1] == "\x1b[" else text[-1]
 
 
+def read_early() -> str:
+    """Returns all that was typed so far. It must not move the wheels."""
+    return (os.read(0, 65536).decode(errors="replace") or "q") if select.select([0], [], [], 0)[0] else ""
+
+
 def steer(socket: str | None, speed: int) -> None:
     direction, until = (0, 0), 0.0
     with Gateway(socket) as gateway, gateway.arm("keys") as wheels:
+        early = read_early()
+        if "q" in early or "\x03" in early:
+            return
+        fresh_from = time.monotonic() + HOLD_S if early else 0.0
         print("armed: w a s d drive, space stops, + - speed, q ends", end="\r\n")
         while True:
             key = read_key(wheels.terms.lease_ms / 3000)
             if key in ("q", "\x03"):
                 return
-            if key in DIRECTIONS:
+            if key in DIRECTIONS and time.monotonic() < fresh_from:
+                fresh_from = time.monotonic() + HOLD_S  # It may have been held since before the wheels were armed.
+            elif key in DIRECTIONS:
                 direction, until = DIRECTIONS[key], time.monotonic() + HOLD_S
             elif key in ("+", "-"):
                 speed = min(1000, max(50, speed + (50 if key == "+" else -50)))

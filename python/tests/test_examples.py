@@ -5,10 +5,13 @@ import csv
 import itertools
 import os
 import pty
+import select
 import signal
 import struct
 import subprocess
 import sys
+import termios
+import threading
 import time
 import unittest
 
@@ -64,6 +67,69 @@ class Examples(RigCase):
         child.wait(5)
         self.assert_stood_by(closed_us, 700)
 
+    def push(self):
+        """A hand that pushes the wheels, so arm waits until `let_go`."""
+        hand = self.rig.hand()
+        self.addCleanup(hand.let_go)
+        with Gateway(self.socket) as gateway:
+            self.wait_until(lambda: not gateway.status()["left"]["at_rest"])
+        return hand
+
+    def keys_waiting(self):
+        """The terminal of keys.py, which waits in arm, and the hand that it waits for."""
+        hand = self.push()
+        master, slave = pty.openpty()
+        self.addCleanup(os.close, master)
+        child = self.start("keys.py", "--socket", self.socket, stdin=slave, stdout=subprocess.DEVNULL)
+        self.wait_until(lambda: not termios.tcgetattr(slave)[3] & termios.ICANON)  # From here on it retains what is typed.
+        os.close(slave)
+        time.sleep(0.2)
+        return master, child, hand
+
+    def test_keys_pressed_before_armed_move_nothing(self):
+        master, child, hand = self.keys_waiting()
+        os.write(master, b"w")
+        hand.let_go()
+        self.wait_until(lambda: self.holder() == "keys")
+        time.sleep(1)
+        self.assert_never_moved()
+        os.write(master, b"w")
+        self.wait_until(lambda: self.last_motion_us() > 0)
+        os.write(master, b"q")
+        self.assertEqual(child.wait(5), 0)
+
+    def test_key_held_since_before_armed_moves_nothing(self):
+        master, child, hand = self.keys_waiting()
+        hold = threading.Event()
+
+        def repeat():
+            while not hold.wait(0.04):
+                os.write(master, b"w")
+
+        held = threading.Thread(target=repeat)
+        held.start()
+        self.addCleanup(held.join)
+        self.addCleanup(hold.set)
+        time.sleep(0.1)
+        hand.let_go()
+        self.wait_until(lambda: self.holder() == "keys")
+        time.sleep(1)
+        hold.set()
+        held.join()
+        time.sleep(0.8)
+        self.assertEqual(self.last_motion_us(), 0)
+        os.write(master, b"w")
+        self.wait_until(lambda: self.last_motion_us() > 0)
+        os.write(master, b"q")
+        self.assertEqual(child.wait(5), 0)
+
+    def test_q_typed_before_armed_ends_keys(self):
+        master, child, hand = self.keys_waiting()
+        os.write(master, b"wqw")
+        hand.let_go()
+        self.assertEqual(child.wait(5), 0)
+        self.assert_never_moved()
+
     def gamepad(self, events=()):
         device = self.rig.path("js0")
         os.mkfifo(device)
@@ -97,6 +163,22 @@ class Examples(RigCase):
         self.assertEqual(child.wait(5), 0)
         os.close(pad)
         self.assert_stood_by(now_us(), 0)
+
+    def test_button_pressed_before_armed_moves_nothing(self):
+        hand = self.push()
+        pad, child = self.gamepad([self.event(0, 0x82, 1)])
+        self.wait_until(lambda: not select.select([pad], [], [], 0)[0])  # It has read the state at the start.
+        time.sleep(0.3)
+        os.write(pad, self.event(-32767, 2, 1) + self.event(1, 1, 4))
+        hand.let_go()
+        self.wait_until(lambda: self.holder() == "gamepad", 5)
+        time.sleep(1)
+        self.assert_never_moved()
+        os.write(pad, self.event(0, 1, 4) + self.event(1, 1, 4))
+        self.wait_until(lambda: self.last_motion_us() > 0)
+        child.send_signal(signal.SIGINT)
+        self.assertEqual(child.wait(5), 0)
+        os.close(pad)
 
     def test_an_unplugged_gamepad_stops(self):
         pad, child = self.gamepad()
