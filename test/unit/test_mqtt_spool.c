@@ -33,6 +33,7 @@ static struct {
     atomic_uint by_caller; ///< Calls that wait for the disk, by the thread of the test.
     atomic_bool hangs;     ///< No sync ends.
     atomic_bool breaks;    ///< Each sync fails.
+    atomic_bool stumbles;  ///< The next sync fails.
     atomic_uint syncs;     ///< Syncs that began.
 } disk;
 
@@ -60,7 +61,7 @@ int __wrap_fdatasync(int file) {
     while (atomic_load(&disk.hangs) && !ours) {
         (void)usleep(1000);
     }
-    if (atomic_load(&disk.breaks)) {
+    if (atomic_exchange(&disk.stumbles, false) || atomic_load(&disk.breaks)) {
         errno = EIO;
         return -1;
     }
@@ -77,8 +78,14 @@ int __wrap_renameat(int from, const char *name, int to, const char *fresh) {
     return __real_renameat(from, name, to, fresh);
 }
 
+/// Gives all that is collected to the disk and waits for its result. Unlike `flush` it begins no new file.
 static void settle(void) {
-    TEST_ASSERT_TRUE(mqtt_spool_flush(&spool));
+    mqtt_spool_sync(&spool);
+    for (unsigned i = 0; i < 1000U && (spool.busy || mqtt_disk_has_more(&spool.disk)); i++) {
+        mqtt_disk_wait(&spool.disk, 10);
+        mqtt_spool_sync(&spool);
+    }
+    TEST_ASSERT_FALSE(spool.busy);
 }
 
 void setUp(void) {
@@ -86,6 +93,7 @@ void setUp(void) {
     atomic_store(&disk.by_caller, 0U);
     atomic_store(&disk.hangs, false);
     atomic_store(&disk.breaks, false);
+    atomic_store(&disk.stumbles, false);
     // In memory, where there is such a folder: each new file waits for the disk.
     (void)snprintf(folder, sizeof folder, "%s/iwheel-spool-XXXXXX",
                    (access("/dev/shm", W_OK) == 0) ? "/dev/shm" : "/tmp");
@@ -388,8 +396,9 @@ TEST(test_spool_disk_full_and_killed_retains_written_events) {
     add(3);
     settle();
     TEST_ASSERT_TRUE(spool.behind);
+    TEST_ASSERT_TRUE(mqtt_spool_close(&spool)); // The disk is still full: closing changes nothing, as a kill does.
     (void)setrlimit(RLIMIT_FSIZE, &before);
-    reopen(); // Closing writes nothing, as a kill does.
+    TEST_ASSERT_TRUE(mqtt_spool_open(&spool, folder, SMALL));
     TEST_ASSERT_TRUE(spool.waiting >= 1U);
     expect(1, (unsigned)spool.waiting);
 }
@@ -458,6 +467,68 @@ TEST(test_spool_disk_that_fails_is_written_again_once_it_works) {
     TEST_ASSERT_GREATER_THAN_size_t(0, read_all(bytes, sizeof bytes));
     reopen();
     expect(1, 3);
+}
+
+/// Breaks the disk until a job with the event 1 has failed.
+static void fail_first_event(void) {
+    settle();
+    atomic_store(&disk.breaks, true);
+    add(1);
+    settle();
+    TEST_ASSERT_TRUE(spool.behind);
+    atomic_store(&disk.breaks, false);
+}
+
+TEST(test_spool_event_during_a_rewrite_is_in_the_file) {
+    fail_first_event();
+    atomic_store(&disk.hangs, true);
+    mqtt_spool_poll(&spool); // The disk has the whole file, without the event 2.
+    add(2);
+    mqtt_spool_confirm(&spool, 1);
+    mqtt_spool_sync(&spool);
+    TEST_ASSERT_TRUE_MESSAGE(spool.behind, "the new file is not complete");
+    atomic_store(&disk.hangs, false);
+    settle();
+    TEST_ASSERT_FALSE(spool.behind);
+    reopen();
+    expect(2, 2);
+}
+
+TEST(test_spool_rewrite_that_fails_loses_no_later_event) {
+    fail_first_event();
+    atomic_store(&disk.hangs, true);
+    mqtt_spool_poll(&spool);
+    add(2);
+    atomic_store(&disk.breaks, true);
+    atomic_store(&disk.hangs, false);
+    settle();
+    TEST_ASSERT_TRUE(spool.behind);
+    atomic_store(&disk.breaks, false);
+    mqtt_spool_poll(&spool);
+    settle();
+    TEST_ASSERT_FALSE(spool.behind);
+    reopen();
+    expect(1, 2);
+}
+
+TEST(test_spool_close_rewrites_a_file_that_is_behind) {
+    fail_first_event();
+    add(2);
+    reopen(); // No poll before.
+    expect(1, 2);
+    settle();
+    atomic_store(&disk.stumbles, true);
+    add(3); // The job of the flush itself fails.
+    reopen();
+    expect(1, 3);
+    settle();
+    atomic_store(&disk.breaks, true);
+    add(4);
+    TEST_ASSERT_TRUE_MESSAGE(mqtt_spool_flush(&spool), "a disk that refuses everything does not hang");
+    TEST_ASSERT_TRUE(spool.behind);
+    atomic_store(&disk.breaks, false);
+    reopen();
+    expect(1, 4);
 }
 
 TEST(test_spool_event_is_on_the_disk_before_the_thread_rests) {

@@ -156,9 +156,15 @@ static void rewrite(mqtt_spool_t *self) {
     self->file_bytes = sizeof magic + sizeof first + size + (gone ? sizeof last : 0U);
 }
 
-/// Collects a record for the file. While the file lacks something, `poll` writes it again with this record.
+/// Returns true if the file lacks something and the thread does not write it again: the next whole file has everything.
+static bool needs_rewrite(const mqtt_spool_t *self) {
+    return self->failed && !self->busy;
+}
+
+/// Collects a record for the file. While the thread writes a whole file, the record follows it: that file was collected
+/// before.
 static void append(mqtt_spool_t *self, const uint8_t *record, size_t length, bool synced) {
-    if (self->failed) {
+    if (needs_rewrite(self)) {
         return;
     }
     if (self->file_bytes + length > 2U * self->size || !mqtt_disk_put(&self->disk, record, length, synced)) {
@@ -265,8 +271,14 @@ bool mqtt_spool_open(mqtt_spool_t *self, const char *directory, size_t max_bytes
 }
 
 bool mqtt_spool_flush(mqtt_spool_t *self) {
+    bool again = true;
     mqtt_spool_sync(self);
-    for (int i = 0; i < CLOSE_MAX && (self->busy || mqtt_disk_has_more(&self->disk)); i++) {
+    for (int i = 0; i < CLOSE_MAX && (self->busy || (again && self->failed)); i++) {
+        if (needs_rewrite(self)) {
+            again = false;
+            rewrite(self);
+            mqtt_spool_sync(self);
+        }
         mqtt_disk_wait(&self->disk, CLOSE_MS);
         mqtt_spool_sync(self);
     }

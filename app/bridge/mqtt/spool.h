@@ -31,7 +31,7 @@ typedef struct {
     mqtt_disk_t disk;
     size_t file_bytes;   ///< Size of the file with all records that were collected for it.
     bool busy;           ///< The thread writes.
-    bool failed;         ///< The disk is full or broken: the file must be written again.
+    bool failed;         ///< The disk refused a job, and has accepted no whole file since.
     unsigned busy_polls; ///< Number of polls in a row in which the thread wrote the same.
     bool behind;         ///< The file lacks something: the disk is full, broken, or has not answered for seconds.
     uint8_t *data;       ///< Records, as in the file.
@@ -59,7 +59,8 @@ typedef struct {
 /// a damaged record.
 bool mqtt_spool_open(mqtt_spool_t *self, const char *directory, size_t max_bytes);
 
-/// Writes what is collected, and waits for the disk for at most a second. Returns false if the disk has not finished.
+/// Writes what is collected, once the whole spool if the file lacks something, and waits for the disk for at most a
+/// second. Returns false if the disk has not finished.
 bool mqtt_spool_flush(mqtt_spool_t *self);
 
 /// Flushes and closes. Returns false if the disk has not finished, so the caller must end by _exit().
