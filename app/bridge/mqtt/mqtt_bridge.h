@@ -18,8 +18,9 @@
 #define MQTT_FIRST_US  1000000U
 #define MQTT_SILENT_US 500000U
 /// Without a state of the gateway for this time, the machine is offline although the connection stays: the gateway
-/// hangs. Twice the longest interval of its states.
-#define MQTT_HUNG_US 2000000U
+/// hangs, or its line is lost. Three and a half of the longest interval of its states, so two lost states are no cause;
+/// and longer than iwheel-serial waits for a board (3.2 s) before it ends the connection.
+#define MQTT_HUNG_US 3500000U
 /// Largest number of events that wait for a confirmation.
 #define MQTT_INFLIGHT_MAX 8U
 /// An event is set aside if the connection ended with it this number of times in a row. With MQTT 3.1.1 some brokers
