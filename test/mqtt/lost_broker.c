@@ -33,7 +33,7 @@ static void pass(unsigned for_ms) {
 
 static void command_from(const char *from, const char *verb, const char *fields) {
     char topic[64];
-    char payload[256];
+    char payload[512];
     const mqtt_labels_t labels = {.expiry_s = 0};
     (void)snprintf(topic, sizeof topic, "iwheel/w1/cmd/%s", verb);
     (void)snprintf(payload, sizeof payload, "{\"boot\":\"%s\",\"t_us\":%llu,\"from\":\"%s\",\"seq\":%u%s}", bridge.boot,
@@ -161,6 +161,23 @@ static void test_sender_has_no_lease_after_the_gateway_restarted(void) {
     TEST_ASSERT_TRUE(daemon_rig_commands_zero());
 }
 
+/// The end of a sentence is the fix.
+static void test_stop_with_a_long_reason_has_its_whole_sentence(void) {
+    char fields[IWN_REASON_MAX + 32U];
+    char sentence[IWN_SENTENCE_SIZE];
+    char reason[IWN_REASON_MAX + 1U];
+    memset(reason, 'r', IWN_REASON_MAX);
+    reason[IWN_REASON_MAX] = '\0';
+    (void)snprintf(fields, sizeof fields, ",\"reason\":\"%s\"", reason);
+    command("estop", fields);
+    pass(50);
+    const char *why = daemon_rig_ask(daemon_rig_connect(), "{\"cmd\":\"why\"}");
+    const iwc_message_t reply = {.text = why, .length = strlen(why)};
+    TEST_ASSERT_TRUE(iwc_text(&reply, "sentence", sentence, sizeof sentence));
+    TEST_ASSERT_GREATER_THAN_size_t(256, strlen(sentence));
+    TEST_ASSERT_EQUAL_STRING(sentence, bridge.stop.sentence);
+}
+
 /// The gateway hangs: its connection stays, and nothing arrives.
 static void pass_hung(unsigned for_ms) {
     for (unsigned ms = 0; ms < for_ms; ms += PASS_MS) {
@@ -245,6 +262,7 @@ int main(void) {
     RUN_TEST(test_stop_never_needs_json_while_a_sender_drives);
     RUN_TEST(test_sender_that_stopped_drives_nothing_without_arm);
     RUN_TEST(test_sender_has_no_lease_after_the_gateway_restarted);
+    RUN_TEST(test_stop_with_a_long_reason_has_its_whole_sentence);
     RUN_TEST(test_gateway_silent_as_long_as_a_serial_relay_stays_online);
     RUN_TEST(test_gateway_that_hangs_is_offline_after_3500_ms_until_its_state);
     RUN_TEST(test_tls_file_whose_disk_hangs_delays_no_round);

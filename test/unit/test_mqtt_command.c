@@ -437,6 +437,18 @@ TEST(test_info_without_a_gateway_has_no_values_of_it) {
         strstr(text, "\"last_stop\":{\"number\":4,\"cause\":\"wheel_lost\",\"wall_us\":null,\"sentence\":\"gone\"}}"));
 }
 
+TEST(test_info_has_the_longest_sentence_of_a_stop) {
+    static char text[MQTT_PAYLOAD_SIZE];
+    static const uint64_t counts[MQTT_VERDICTS];
+    mqtt_stop_t stop = {.number = 4, .cause = "wheel_lost"};
+    const mqtt_info_t info = {.boot = BOOT, .settings = &mqtt_settings_standard, .counts = counts, .stop = &stop};
+    TEST_ASSERT_EQUAL_size_t(IWN_SENTENCE_SIZE, sizeof stop.sentence);
+    memset(stop.sentence, 's', IWN_SENTENCE_SIZE - 1U);
+    const size_t length = mqtt_write_info(&info, (mqtt_buffer_t){text, sizeof text});
+    text[length] = '\0';
+    TEST_ASSERT_NOT_NULL(strstr(text, stop.sentence));
+}
+
 // ---- settings -----------------------------------------------------------------------------------------------------
 
 static unsigned errors_of(const char *text) {

@@ -10,6 +10,7 @@
 #include "mqtt_settings.h"
 
 #include "iwheel_client/client.h"
+#include "iwheel_northbound/why.h"
 
 /// Largest message: the longest line of the gateway, with the members before it.
 #define MQTT_PAYLOAD_SIZE (IWC_LINE_MAX + 512U)
@@ -50,7 +51,7 @@ typedef struct {
     int64_t number; ///< 0: this run of the bridge knows none.
     int64_t wall_us;
     char cause[32];
-    char sentence[256];
+    char sentence[IWN_SENTENCE_SIZE];
 } mqtt_stop_t;
 
 /// Contents of the retained `info` of the bridge and its machine. `state`: the newest one; NULL: the gateway is away.
