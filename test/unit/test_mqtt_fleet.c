@@ -2,6 +2,7 @@
 // The rows of the fleet console, from messages of machines and of other clients at the broker.
 #include "fleet.h"
 
+#include "iwheel_northbound/why.h"
 #include "unit.h"
 
 #include <stdlib.h>
@@ -76,6 +77,16 @@ TEST(test_fleet_stop_has_its_cause_without_control_characters) {
     TEST_ASSERT_NULL(strchr(text, '\033'));
     TEST_ASSERT_NOT_NULL(strstr(text, "wheel_"));
     TEST_ASSERT_NOT_NULL(strstr(show(fleet_print), "\"stop_wall_us\":1760000000000000,\"sentence\":\"left wheel\""));
+}
+
+TEST(test_fleet_stop_has_the_longest_sentence) {
+    char sentence[IWN_SENTENCE_SIZE];
+    char payload[IWN_SENTENCE_SIZE + 128U];
+    memset(sentence, 's', sizeof sentence);
+    sentence[sizeof sentence - 1U] = '\0';
+    (void)snprintf(payload, sizeof payload, "{\"event\":\"stop\",\"cause\":\"client\",\"sentence\":\"%s\"}", sentence);
+    receive("iwheel/w1/event/stop", payload);
+    TEST_ASSERT_NOT_NULL(strstr(show(fleet_print), sentence));
 }
 
 static const char *row(void) {

@@ -2,6 +2,7 @@
 // The events that the stream has stored: each event once, with the gaps, in the requested span.
 #include "history.h"
 
+#include "iwheel_northbound/why.h"
 #include "unit.h"
 
 #include <stdlib.h>
@@ -69,6 +70,18 @@ TEST(test_history_stop_is_one_line_with_time_and_sentence) {
     TEST_ASSERT_EQUAL_STRING("2026-11-21 22:01:01 w1           stop   stop number 1\n", text());
     history_sum(&history, "n1");
     assert_printed("1 stop of 1 machine, 2026-11-21 22:00:00 to 2026-11-21 23:00:00, from the stream at n1\n");
+}
+
+TEST(test_history_stop_has_the_longest_sentence) {
+    char sentence[IWN_SENTENCE_SIZE];
+    char payload[IWN_SENTENCE_SIZE + 128U];
+    memset(sentence, 's', sizeof sentence);
+    sentence[sizeof sentence - 1U] = '\0';
+    (void)snprintf(payload, sizeof payload, "{\"id\":\"a-1\",\"event\":\"stop\",\"number\":1,\"sentence\":\"%s\"}",
+                   sentence);
+    begin((history_config_t){0});
+    other("stop", payload);
+    assert_printed(sentence);
 }
 
 TEST(test_history_doubles_are_dropped_across_bridge_restarts) {

@@ -40,7 +40,7 @@ static fleet_machine_t *machine_of(fleet_t *self, const char *id) {
 }
 
 void fleet_text(const iwc_message_t *message, const char *path, char *out, size_t size) {
-    char raw[256];
+    char raw[IWN_SENTENCE_SIZE];
     if (iwc_text(message, path, raw, sizeof raw)) {
         iwn_plain_copy(raw, out, size);
     } else {
@@ -269,7 +269,7 @@ static const char *source_word(fleet_source_t source) {
     return words[source];
 }
 
-#define ROW_SIZE 1536U
+#define ROW_SIZE (2U * IWN_SENTENCE_SIZE + 1280U)
 
 /// Writes one machine as a JSON object. Returns its length, without a newline.
 static size_t write_row(const fleet_machine_t *machine, uint64_t now_us, char line[ROW_SIZE]) {

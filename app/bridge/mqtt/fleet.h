@@ -10,6 +10,7 @@
 
 #include "iwheel_client/client.h"
 #include "iwheel_northbound/json_in.h"
+#include "iwheel_northbound/why.h"
 
 #include <stdio.h>
 
@@ -33,7 +34,7 @@ typedef struct {
     char cause[24]; ///< Cause of the last stop; empty: unknown.
     int64_t stop_wall_us;
     fleet_source_t stop_from;
-    char sentence[200];
+    char sentence[IWN_SENTENCE_SIZE];
     iwc_value_t battery_dV[2]; ///< Left, right.
     char zero[2][16];          ///< Source of the zero of the force; `doubted` if it was measured under load.
     char contradicted[96];     ///< Contradicted assumptions, separated by blanks.

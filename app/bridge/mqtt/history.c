@@ -232,7 +232,7 @@ static void show(const history_t *self, const history_machine_t *machine, const 
                  const int64_t times_us[2]) {
     char when[HISTORY_TIME_SIZE];
     char stored[HISTORY_TIME_SIZE];
-    char text[320];
+    char text[IWN_SENTENCE_SIZE];
     const int64_t late_us = times_us[1] - times_us[0];
     history_time(times_us[0], when);
     history_time(times_us[1], stored);
