@@ -269,12 +269,12 @@ static bool make_boot(char out[MQTT_BOOT_SIZE]) {
 }
 
 static bool has_name(const mqtt_settings_t *settings) {
-    if (!mqtt_settings_given(settings->machine.id)) {
+    const bool given = mqtt_settings_given(settings->machine.id);
+    if (!given) {
         (void)fputs("iwheel-mqtt: this machine has no name; set id under [machine] in " MQTT_SETTINGS_PATH "\n",
                     stderr);
-        return false;
     }
-    return true;
+    return given;
 }
 
 static int no_spool(const mqtt_settings_t *settings) {

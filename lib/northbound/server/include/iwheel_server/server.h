@@ -81,7 +81,7 @@ typedef struct iwn_server {
     // The caller reads these members.
     /// Times of the last requests of clients; 0 if there was none. `stopped_us` also of the e-stop line, while pressed.
     iw_time_us_t stopped_us, estopped_us;
-    iw_client_t stopped_by, estopped_by;  ///< Client of that request.
+    iw_client_t stopped_by, estopped_by; ///< Client of that request.
     iwn_reported_t reported;
     iw_snapshot_t seen;        ///< Snapshot of iwn_server_snapshot.
     iwn_request_t request;     ///< The caller sets it before iwn_server_request.
