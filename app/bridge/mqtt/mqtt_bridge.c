@@ -232,8 +232,7 @@ static uint64_t hung_us(const mqtt_bridge_t *self) {
 static void judge_silence(mqtt_bridge_t *self) {
     if (self->now_us >= hung_us(self)) {
         (void)fprintf(stderr,
-                      "iwheel-mqtt: the gateway sends no state for %u ms; the machine is published as offline; see "
-                      "journalctl -u iwheel-gateway\n",
+                      "iwheel-mqtt: offline: the gateway sends no state for %u ms; see journalctl -u iwheel-gateway\n",
                       MQTT_HUNG_US / 1000U);
         go_offline(self);
     }
