@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 from unittest import mock
 
@@ -95,6 +96,21 @@ class Live(Folder, RigCase):
         self.assertLess(abs(recording.samples[-1].time_s - recording.samples[0].time_s - 1.0), 0.5)
         with Gateway(self.socket) as gateway, self.assertRaises(FileExistsError):
             gateway.record(path, seconds=0.1)
+
+    def test_record_leaves_no_frame_behind(self):
+        path = self.path("late.log")
+        with Gateway(self.socket) as gateway:
+            watch = gateway.watch
+
+            def watch_late(*topics, **rest):
+                time.sleep(0.0 if topics else 0.2)  # Meanwhile frames arrive.
+                return watch(*topics, **rest)
+
+            with mock.patch.object(gateway, "watch", watch_late):
+                count = gateway.record(path, seconds=0.2)
+            self.assertEqual(list(gateway.events(timeout=0.1)), [])
+        with open(path, encoding="utf-8") as file:
+            self.assertEqual(len(file.readlines()), count)
 
     def test_plot_draws_the_states_into_a_picture(self):
         picture = self.path("plot.png")

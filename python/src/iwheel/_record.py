@@ -13,6 +13,7 @@ from ._protocol import FrameEvent
 
 if TYPE_CHECKING:
     from ._gateway import Gateway
+    from ._types import Event
 
 POLL_S = 0.2
 """Longest wait for a frame, after which the time is checked and the file is written."""
@@ -41,23 +42,30 @@ def record(gateway: Gateway, path: str | os.PathLike[str], seconds: float) -> in
         bus = gateway.hello()["bus"]
         interface = "local" if bus.startswith("unix:") else bus
         wall_less_us = wall_less_monotonic_us(gateway)
+
+        def take(event: Event) -> None:
+            nonlocal count, wall_less_us
+            if event["event"] == "frame":
+                file.write(line_of(event, wall_less_us, interface))
+                count += 1
+            elif event["event"] == "lost":
+                file.write(f"# {event['count']} frames are missing: this program was too slow\n")
+            elif event["event"] == "disconnected":
+                file.write("# the connection was lost; frames are missing\n")
+            elif event["event"] == "reconnected":
+                wall_less_us = wall_less_monotonic_us(gateway)
+
         gateway.watch("frame")
         try:
             while time.monotonic() < end:
                 for event in gateway.events(timeout=min(POLL_S, max(0.0, end - time.monotonic()))):
-                    if event["event"] == "frame":
-                        file.write(line_of(event, wall_less_us, interface))
-                        count += 1
-                    elif event["event"] == "lost":
-                        file.write(f"# {event['count']} frames are missing: this program was too slow\n")
-                    elif event["event"] == "disconnected":
-                        file.write("# the connection was lost; frames are missing\n")
-                    elif event["event"] == "reconnected":
-                        wall_less_us = wall_less_monotonic_us(gateway)
+                    take(event)
                     if time.monotonic() >= end:
                         break
                 file.flush()
         finally:
             with contextlib.suppress(IWheelError):
-                gateway.watch()  # Ends the subscription.
+                gateway.watch()  # Ends the subscription. Frames that came before its reply belong to the recording.
+                for event in gateway.events(timeout=0.0):
+                    take(event)
     return count
