@@ -3,11 +3,13 @@
 
 import pytest
 import base64
+import contextlib
 import json
 import re
 import shutil
 import signal
 import socket
+import socketserver
 import ssl
 import subprocess
 import threading
@@ -449,6 +451,53 @@ def test_mqtt5_all_but_events_expire_replies_use_response_topic(rig):
     name, folder = stop_with_recording(rig), folder_of(rig)
     code, out, err = console(rig, write_config(rig, port=rig.port, protocol=5), "recording", ID, name, "-o", str(folder / "x"))
     assert code == 0 and (folder / "x.log").read_bytes() == Path(rig.path(name + ".log")).read_bytes(), (code, out, err)
+
+
+class DeadLine(socketserver.ThreadingUnixStreamServer):
+    """Between bridge and gateway, as iwheel-serial with a dead line: it passes everything on but stops, which it refuses."""
+
+    daemon_threads = True
+
+    class RequestHandlerClass(socketserver.StreamRequestHandler):
+        def handle(self):
+            with socket.socket(socket.AF_UNIX) as gateway:
+                gateway.connect(self.server.gateway)
+                threading.Thread(target=self.pass_back, args=(gateway,), daemon=True).start()
+                for line in self.rfile:
+                    request = json.loads(line)
+                    if request["cmd"] == "stop":
+                        refusal = {"id": request["id"], "ok": False, "error": "bus_down", "message": "this stop was not delivered"}
+                        self.wfile.write(json.dumps(refusal).encode() + b"\n")
+                    else:
+                        gateway.sendall(line)
+
+        def pass_back(self, gateway):
+            with contextlib.suppress(OSError):
+                while data := gateway.recv(65536):
+                    self.wfile.write(data)
+
+    def __init__(self, path, gateway):
+        self.gateway = gateway
+        super().__init__(path, self.RequestHandlerClass)
+        threading.Thread(target=self.serve_forever, daemon=True).start()
+
+
+@pytest.mark.rig(settings={"broker": {"protocol": "5"}})
+def test_mqtt5_stop_without_json_is_reported_as_the_gateway_reports_it(rig):
+    rig.mqtt_settings["gateway"]["socket"] = rig.path("line.sock")
+    rig.start_gateway()
+    rig.start_broker()
+    with DeadLine(rig.path("line.sock"), rig.path("watch.sock")) as line:
+        rig.start_bridge()
+        far = Far5(rig)
+        until(lambda: far.of("availability")[-1:] and far.of("availability")[-1][0] == b"online", what="online")
+        properties = Properties(PacketTypes.PUBLISH)
+        properties.ResponseTopic = f"iwheel/{ID}/reply/far5"
+        far.client.publish(f"iwheel/{ID}/cmd/stop", "{", properties=properties)
+        reply = json.loads(until(lambda: far.of("reply/far5"), what="a reply")[0][0])
+        assert reply["error"] == "bus_down", reply
+        rig.end_bridge()
+        line.shutdown()
 
 
 @pytest.mark.rig(settings={"broker": {"protocol": "5"}})
