@@ -205,6 +205,15 @@ TEST(test_one_person_reset_from_before_the_button_was_pressed_is_late) {
     assert_reply(aged("reset", 100), "\"ok\":true");
 }
 
+/// The button is the reason that a person can see, so a request of after the press is not late.
+TEST(test_one_person_request_while_the_button_is_pressed_names_it) {
+    daemon_rig.estop = 1;
+    daemon_rig_run(500);
+    assert_reply(aged("arm", 100), "\"error\":\"estop_pressed\"");
+    assert_reply(aged("reset", 100), "\"error\":\"estop_pressed\"");
+    assert_reply(aged("reset", 600), "\"error\":\"stale_command\"");
+}
+
 /// Within the time of an event it is the same stop. An older reset is late by its time.
 TEST(test_one_person_reset_from_before_a_second_estop_is_late) {
     const int other = daemon_rig_connect();

@@ -182,8 +182,9 @@ void iwn_server_observe(iwn_server_t *self, const iw_snapshot_t *seen) {
         self->reported.started = true;
         self->reported.started_us = self->now_us;
     }
-    // What was sent before the button was last seen pressed is late, as after a client's request to stop.
-    if ((seen->present & ((1U << IW_CAUSE_ESTOP_LINE) | (1U << IW_CAUSE_ESTOP_DISAGREES))) != 0U) {
+    // What was sent before the last edge of the button is late, as after a client's request to stop.
+    const uint32_t edges = seen->present ^ self->reported.present;
+    if ((edges & ((1U << IW_CAUSE_ESTOP_LINE) | (1U << IW_CAUSE_ESTOP_DISAGREES))) != 0U) {
         self->stopped_us = self->now_us;
     }
     observe_bus(self, seen, first);

@@ -79,7 +79,7 @@ typedef struct iwn_server {
     iwn_estop_t estop; ///< Set before iwn_server_observe.
 
     // The caller reads these members.
-    /// Times of the last requests of clients; 0 if there was none. `stopped_us` also of the e-stop line, while pressed.
+    /// Times of the last requests of clients; 0 if there was none. `stopped_us` also of an edge of the button.
     iw_time_us_t stopped_us, estopped_us;
     iw_client_t stopped_by, estopped_by; ///< Client of that request.
     iwn_reported_t reported;
