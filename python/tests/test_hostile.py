@@ -279,6 +279,13 @@ class Hostile(unittest.TestCase):
             Gateway(impostor.path).arm()
         self.assertEqual([json.loads(line)["cmd"] for line in impostor.received], ["status", "arm"])
 
+    def test_reset_is_never_asked_twice(self):
+        impostor = Impostor(b"", close=True)
+        self.addCleanup(impostor.end)
+        with self.assertRaises(GatewayUnavailable):
+            Gateway(impostor.path).reset()
+        self.assertEqual([json.loads(line)["cmd"] for line in impostor.received], ["reset"])
+
     def test_status_without_time_is_no_reason_to_arm(self):
         impostor, text = self.both(b'{"id":1,"ok":true}\n', ProtocolError, ask="arm")
         self.assertIn("the reply to status has no t_us", text)

@@ -444,7 +444,7 @@ class AsyncGateway:
                     armed._end(STOPPED_MEANWHILE)
                 return armed
             except Refused as refusal:
-                if not asked.refused(refusal) or self._stops != stops or not time.monotonic() < until:
+                if not asked.refused(refusal) or not time.monotonic() < until:
                     raise asked.reason(refusal) from None
             except BaseException:  # Cancelled, dropped, no usable reply: only closing the connection surely ends a lease that began.
                 stream.close("arming was interrupted")

@@ -217,7 +217,7 @@ class Gateway:
                 reply = self._ask_on(connection, "arm", fields)
                 break
             except Refused as refusal:
-                if not asked.refused(refusal) or self._stops != stops or not time.monotonic() < deadline:
+                if not asked.refused(refusal) or not time.monotonic() < deadline:
                     raise asked.reason(refusal) from None
             time.sleep(ARM_AGAIN_S)
             asked.begin(self._ask_on(connection, "status", {}))
