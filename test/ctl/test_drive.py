@@ -20,12 +20,15 @@ class Pushed(unittest.TestCase):
         self.addCleanup(self.rig.close)
         self.rig.start_gateway()
         self.other = self.rig.client("other")
+
+    def push(self):
         self.hand = self.rig.hand()
         self.addCleanup(self.hand.let_go)
         self.rig.wait_status(self.other, lambda status: not status["left"]["at_rest"])
 
     def drive(self):
-        """The process, once it waits for standstill."""
+        """The process, once it waits for standstill of wheels that are pushed."""
+        self.push()
         command = [ctl.program(), "--socket", self.rig.path("gateway.sock"), "drive", "200", "200", "--for", "300ms"]
         process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=ctl.environment())
         self.addCleanup(process.communicate)
@@ -54,4 +57,3 @@ class Pushed(unittest.TestCase):
             self.assertRegex(err, r"refused \(stale_command\): the wheels were stopped after t_us of this request, \d+ ms ago; read why")
             time.sleep(1.0)
             hold(not self.moved(), f"{cmd} was undone: {self.moved()[:1]} mm/s")
-            self.hand = self.rig.hand()
