@@ -339,8 +339,8 @@ static int wait_a_moment(const drive_t *self) {
     return (result == IWC_TIMEOUT) ? CTL_OK : ctl_lost(result);
 }
 
-static bool passes(const json_t *reply) {
-    return json_is_false(json_object_get(reply, "ok")) && strcmp(text_word(reply, "error"), "not_at_rest") == 0;
+static bool is_refused(const json_t *reply, const char *error) {
+    return json_is_false(json_object_get(reply, "ok")) && strcmp(text_word(reply, "error"), error) == 0;
 }
 
 /// Waits, and arms again. The request still has the time of an earlier attempt, so a stop in the meantime refuses it.
@@ -359,15 +359,22 @@ static int arm_again(drive_t *self, json_t *request, json_t **out_reply) {
     return code;
 }
 
-/// Arms, and tries again while the wheels are not at standstill. Returns as ctl_ask does.
+/// Arms, and tries again while the wheels are not at standstill. Returns as ctl_ask does. A gateway before 0.3 does not
+/// know the time in the request: there it tries once, because it would undo a stop in the meantime.
 static int ask_to_arm(drive_t *self, json_t *request, json_t **out_reply) {
     const int64_t end_us = client_now_us() + ARM_PATIENCE_US;
     ctl_set_time(request, self->latest);
     int code = ctl_exchange(self->ctl, json_incref(request), out_reply);
-    if (code == CTL_OK && passes(*out_reply)) {
+    const bool is_old = code == CTL_OK && is_refused(*out_reply, "unknown_field");
+    if (is_old) {
+        json_decref(*out_reply);
+        *out_reply = NULL;
+        (void)json_object_del(request, "t_us");
+        code = ctl_exchange(self->ctl, json_incref(request), out_reply);
+    } else if (code == CTL_OK && is_refused(*out_reply, "not_at_rest")) {
         (void)ctl_fail(CTL_OK, "waiting for one second at most, because %s", text_word(*out_reply, "message"));
     }
-    while (code == CTL_OK && passes(*out_reply) && client_now_us() < end_us) {
+    while (!is_old && code == CTL_OK && is_refused(*out_reply, "not_at_rest") && client_now_us() < end_us) {
         code = arm_again(self, request, out_reply);
     }
     json_decref(request);

@@ -444,6 +444,8 @@ class AsyncGateway:
                     armed._end(STOPPED_MEANWHILE)
                 return armed
             except Refused as refusal:
+                if asked.is_unknown(refusal):
+                    continue
                 if not asked.refused(refusal) or not time.monotonic() < until:
                     raise asked.reason(refusal) from None
             except BaseException:  # Cancelled, dropped, no usable reply: only closing the connection surely ends a lease that began.

@@ -217,6 +217,8 @@ class Gateway:
                 reply = self._ask_on(connection, "arm", fields)
                 break
             except Refused as refusal:
+                if asked.is_unknown(refusal):
+                    continue
                 if not asked.refused(refusal) or not time.monotonic() < deadline:
                     raise asked.reason(refusal) from None
             time.sleep(ARM_AGAIN_S)

@@ -156,7 +156,7 @@ class ArmTime:
     """
 
     def __init__(self, status: Message) -> None:
-        self.t_us: int = fields_of("status", status, ["t_us"])["t_us"]
+        self.t_us: int | None = fields_of("status", status, ["t_us"])["t_us"]
         self._begun_us = self.t_us
         self._earlier: Refused | None = None
 
@@ -164,9 +164,16 @@ class ArmTime:
         """Begins the next attempt. `status` was requested for it, after the refusal of the last one."""
         self._begun_us = fields_of("status", status, ["t_us"])["t_us"]
 
+    def is_unknown(self, refusal: Refused) -> bool:
+        """Returns True once if the gateway, older than 0.3, does not know `t_us`: then one attempt without it, and no other."""
+        unknown = refusal.error == "unknown_field" and self.t_us is not None
+        if unknown:
+            self.t_us = None
+        return unknown
+
     def refused(self, refusal: Refused) -> bool:
         """Notes the refusal of this attempt. Returns True if another attempt can be granted."""
-        passing = refusal.error in PASSING and "t_us" not in refusal.message
+        passing = self.t_us is not None and refusal.error in PASSING and "t_us" not in refusal.message
         if passing:
             self._earlier = refusal
         if refusal.error == "not_at_rest":
