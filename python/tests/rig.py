@@ -72,5 +72,14 @@ class RigCase(unittest.TestCase):
             self.assertLess(time.monotonic(), deadline, "the condition did not become true")
             time.sleep(0.01)
 
+    def push(self):
+        """A hand that pushes the wheels, so arm waits until `let_go`."""
+        hand = self.rig.hand()
+        self.addCleanup(hand.let_go)
+        looker = self.rig.client("looker")
+        self.wait_until(lambda: not looker.request("status")["left"]["at_rest"])
+        looker.close()
+        return hand
+
 
 __all__ = ["BUILD", "EXAMPLES", "HERE", "ROOT", "SOURCES", "RigCase", "now_us", "require_gateway"]

@@ -67,14 +67,6 @@ class Examples(RigCase):
         child.wait(5)
         self.assert_stood_by(closed_us, 700)
 
-    def push(self):
-        """A hand that pushes the wheels, so arm waits until `let_go`."""
-        hand = self.rig.hand()
-        self.addCleanup(hand.let_go)
-        with Gateway(self.socket) as gateway:
-            self.wait_until(lambda: not gateway.status()["left"]["at_rest"])
-        return hand
-
     def keys_waiting(self):
         """The terminal of keys.py, which waits in arm, and the hand that it waits for."""
         hand = self.push()

@@ -271,28 +271,8 @@ class Arming(RigCase):
                 gateway.arm(wait=0)
             self.assertEqual(caught.exception.error, "stale_command")
 
-    def test_stick_that_is_held_is_awaited_for_the_given_time_only(self):
-        other = self.rig.client()
-        quit_it = threading.Event()
-
-        def hold():
-            while not quit_it.wait(0.05):
-                other.drive(100, 100)
-
-        stick = threading.Thread(target=hold)
-        stick.start()
-        self.addCleanup(stick.join)
-        self.addCleanup(quit_it.set)
-        time.sleep(0.2)
-        with Gateway(self.socket) as gateway:
-            begin = time.monotonic()
-            with self.assertRaises(Refused) as caught:
-                gateway.arm(wait=0.7)
-            self.assertEqual(caught.exception.error, "stale_command")
-            self.assertGreater(time.monotonic() - begin, 0.7)
-            self.assertLess(time.monotonic() - begin, 1.2)
-
-    def test_stick_that_is_never_let_go_ends_the_wait_at_max_age(self):
+    def hold_stick(self):
+        """Another client sends drive commands until the end of the test."""
         other = self.rig.client("joystick")
         quit_it = threading.Event()
 
@@ -305,19 +285,24 @@ class Arming(RigCase):
         self.addCleanup(stick.join)
         self.addCleanup(quit_it.set)
         time.sleep(0.2)
+
+    def test_stick_that_is_held_is_awaited_for_the_given_time_only(self):
+        self.hold_stick()
+        with Gateway(self.socket) as gateway:
+            begin = time.monotonic()
+            with self.assertRaises(Refused) as caught:
+                gateway.arm(wait=0.7)
+            self.assertEqual(caught.exception.error, "stale_command")
+            self.assertGreater(time.monotonic() - begin, 0.7)
+            self.assertLess(time.monotonic() - begin, 1.2)
+
+    def test_stick_that_is_never_let_go_ends_the_wait_at_max_age(self):
+        self.hold_stick()
         with Gateway(self.socket) as gateway:
             begin = time.monotonic()
             with self.assertRaisesRegex(Refused, r"more than 1000 ms after t_us.* \(it was refused before, because client \d+ .*sent a nonzero drive"):
                 gateway.arm(wait=10)
             self.assertLess(time.monotonic() - begin, 3)
-
-    def push(self):
-        """A hand that pushes the wheels until `let_go`."""
-        hand = self.rig.hand()
-        self.addCleanup(hand.let_go)
-        with Gateway(self.socket) as gateway:
-            self.wait_until(lambda: not gateway.status()["left"]["at_rest"])
-        return hand
 
     def test_arm_waits_longer_than_max_age_for_standstill(self):
         hand = self.push()

@@ -268,12 +268,12 @@ static bool make_boot(char out[MQTT_BOOT_SIZE]) {
 }
 
 static bool has_name(const mqtt_settings_t *settings) {
-    const bool given = mqtt_settings_given(settings->machine.id);
-    if (!given) {
+    if (!mqtt_settings_given(settings->machine.id)) {
         (void)fputs("iwheel-mqtt: this machine has no name; set id under [machine] in " MQTT_SETTINGS_PATH "\n",
                     stderr);
+        return false;
     }
-    return given;
+    return true;
 }
 
 static int no_spool(const mqtt_settings_t *settings) {
